@@ -173,19 +173,18 @@ def chain_faults(
             )
 
 
-def far_off_hits(expected: ExpectedFrfs, q: np.ndarray) -> Alternative:
-    """Hits of another point, or slanted: they take it up as they are, so nothing else is wrong.
+def loose(expected: ExpectedFrfs, q: np.ndarray, placed: bool) -> list[Alternative]:
+    """Hits of another point, or slanted; where `placed`, a tool that was changed, or loaded, too.
 
-    So free numbers take up what springs do from visit to visit, too: evidence has to be certain.
+    They take it up as they are, so nothing else is wrong. So free numbers take up what springs do
+    from visit to visit, too: evidence has to be certain.
     """
-    far = replace(expected, times=MUCH)
-    return Alternative(q, FAR_OFF_HITS, about="chain", rival=True, rarer=CERTAIN, expected=far)
-
-
-def other_tool(expected: ExpectedFrfs, q: np.ndarray) -> Alternative:
-    """A tool that was changed, or loaded, since the poses before; as certain."""
-    other = replace(expected, tool_sds=MUCH)
-    return Alternative(q, OTHER_TOOL, about="chain", rival=True, rarer=CERTAIN, expected=other)
+    free = [(FAR_OFF_HITS, replace(expected, times=MUCH))]
+    free += [(OTHER_TOOL, replace(expected, tool_sds=MUCH))] if placed else []
+    return [
+        Alternative(q, what, about="chain", rival=True, rarer=CERTAIN, expected=one)
+        for what, one in free
+    ]
 
 
 def _best(less: Callable[[float], float]) -> float:

@@ -4,7 +4,6 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,7 @@ import msgspec
 
 from planner.campaign import events, store
 from planner.campaign.config import load_campaign_config
-from planner.campaign.journal import encode_line, remove_parts
+from planner.campaign.journal import remove_parts
 from planner.campaign.read_only import ReadOnlyCampaign
 from planner.campaign.undo import last_acts, last_undone
 from planner.dataset.screened_files import Source
@@ -36,7 +35,7 @@ class Campaign(ReadOnlyCampaign):
         Raises InputError if the folder is in use or any input is wrong.
         """
         own = None if campaign_toml is None else Path(campaign_toml)
-        store.create_folder(Path(directory), Path(robot_toml), own, _first_entry)
+        store.create_folder(Path(directory), Path(robot_toml), own, _first_event)
         return cls(directory)
 
     def next(self, count: int = 1, acquisition: str | None = None) -> tuple[events.Proposal, ...]:
@@ -250,8 +249,8 @@ class Campaign(ReadOnlyCampaign):
             yield
 
 
-def _first_entry(directory: Path) -> bytes:
-    """The log of a new campaign, once robot and workspace have been held against each other."""
+def _first_event(directory: Path) -> events.Configured:
+    """What begins a campaign's log, once robot and workspace were held against each other."""
     from planner.campaign.cell import Cell, refuse_errors
 
     config = load_campaign_config(directory / store.CONFIG)
@@ -259,7 +258,4 @@ def _first_entry(directory: Path) -> bytes:
     refuse_errors(cell.examined)
     hashes = store.robot_hashes(directory)
     store.keep_robot_files(directory, hashes)
-    now = datetime.now(UTC).isoformat(timespec="milliseconds")
-    units = cell.robot.joints.declared
-    event = events.Configured(config, hashes, __version__, units)
-    return encode_line("", events.Entry(1, now, event))[0]
+    return events.Configured(config, hashes, __version__, cell.robot.joints.declared)

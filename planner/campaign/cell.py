@@ -1,7 +1,7 @@
 """What stays the same while a campaign is measured: robot, simulation, workspace, candidates."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -42,8 +42,6 @@ class Cell:
     robot: Robot
     simulation: Simulation | None
     workspace: Workspace
-    # The cut whose stability is to be decided, where campaign.toml names one.
-    cut: Cut | None = field(default=None, kw_only=True)
 
     @classmethod
     def load(
@@ -67,9 +65,42 @@ class Cell:
             workspace = Workspace.from_table(config.workspace, robot)
         except InputError as error:  # which names an entry of the file only
             raise InputError(f"campaign.toml: {error}") from None
-        _check_angles(robot, config)
-        cut = _cut_of(robot_toml, config)
-        return cls(config, robot, simulation, workspace, cut=cut)
+        cell = cls(config, robot, simulation, workspace)
+        cell._check_angles()
+        _ = cell.cut  # so that what is wrong with it is said here
+        return cell
+
+    def _check_angles(self) -> None:
+        """Hold the joint angles that campaign.toml names against the robot; InputError."""
+        config = self.config
+        for where, poses in (
+            ("[goal] joints_deg", config.goal.joints_deg),
+            ("[acquisition] own_poses_deg", config.acquisition.own_poses_deg),
+            ("[cut] joints_deg", config.cut.joints_deg if config.cut else None),
+        ):
+            for number, pose in enumerate(poses or (), 1):
+                self.check_pose(pose, f"campaign.toml, {where}, pose {number}")
+        dof = len(self.robot.joint_names)
+        for zone in config.forbidden:
+            if zone.joints_deg is not None and len(zone.joints_deg) != dof:
+                raise InputError(
+                    f"campaign.toml, [[forbidden]] joints_deg has {len(zone.joints_deg)} ranges, "
+                    f"the robot {dof} joints; give one range a joint."
+                )
+
+    @cached_property
+    def cut(self) -> Cut | None:
+        """The cut whose stability is to be decided; None where campaign.toml names none."""
+        table = self.config.cut
+        if table is msgspec.UNSET:
+            return None
+        cut = load_cut(self.robot.path.parent / table.file)
+        if table.joints_deg is None and cut.feed_in == "path":
+            raise InputError(
+                f'{table.file}: feed_in = "path" needs the path\'s poses; give [cut] joints_deg in '
+                f"campaign.toml, or state the feed."
+            )
+        return cut
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
@@ -94,7 +125,7 @@ class Cell:
         spread = self._spread
         if not own:
             return spread
-        q = np.array([self.check_pose(tuple(p), "[acquisition] own_poses_deg") for p in own])
+        q = self.robot.joints.internal(own)
         collisions = Collisions(self.robot)
         q = q[[not collisions.contacts(one) for one in q]]
         return Candidates(
@@ -173,16 +204,15 @@ class Cell:
         per_hit, per_sensor = table.minutes_per_hit, table.minutes_per_sensor
         return Cost(speed, table.minutes_per_pose, per_hit, table.hits_per_axis, per_sensor)
 
-    def check_pose(self, joints_deg: tuple[float, ...], where: str) -> np.ndarray:
+    def check_pose(self, joints_deg: Sequence[float], where: str) -> np.ndarray:
         """The pose in rad (m); InputError if the robot cannot stand there."""
         return checked_pose(self.robot, joints_deg, where)
 
     def poses(self, joints_deg: ArrayLike) -> np.ndarray:
         """Poses (n, dof) in degrees (mm), or one of them, as q in rad (m); checked each."""
         angles = np.atleast_2d(np.asarray(joints_deg, dtype=float))
-        for number, row in enumerate(angles, 1):
-            self.check_pose(tuple(row), f"joints_deg, pose {number}")
-        return self.robot.joints.internal(angles)
+        each = enumerate(angles, 1)
+        return np.array([self.check_pose(tuple(r), f"joints_deg, pose {k}") for k, r in each])
 
 
 def checked_pose(robot: Robot, joints_deg: Sequence[float], where: str) -> np.ndarray:
@@ -208,36 +238,6 @@ def checked_pose(robot: Robot, joints_deg: Sequence[float], where: str) -> np.nd
             f"outside its limits of {low} to {high}; check columns and units ({unit})."
         )
     return q
-
-
-def _check_angles(robot: Robot, config: CampaignConfig) -> None:
-    """Hold the joint angles that campaign.toml names against the robot; InputError."""
-    for where, poses in (
-        ("[goal] joints_deg", config.goal.joints_deg),
-        ("[acquisition] own_poses_deg", config.acquisition.own_poses_deg),
-        ("[cut] joints_deg", config.cut.joints_deg if config.cut else None),
-    ):
-        for number, pose in enumerate(poses or (), 1):
-            checked_pose(robot, pose, f"campaign.toml, {where}, pose {number}")
-    for zone in config.forbidden:
-        if zone.joints_deg is not None and len(zone.joints_deg) != len(robot.joint_names):
-            raise InputError(
-                f"campaign.toml, [[forbidden]] joints_deg has {len(zone.joints_deg)} ranges, the "
-                f"robot {len(robot.joint_names)} joints; give one range a joint."
-            )
-
-
-def _cut_of(robot_toml: Path, config: CampaignConfig) -> Cut | None:
-    table = config.cut
-    if table is msgspec.UNSET:
-        return None
-    cut = load_cut(robot_toml.parent / table.file)
-    if table.joints_deg is None and cut.feed_in == "path":
-        raise InputError(
-            f'{table.file}: feed_in = "path" needs the path\'s poses; give [cut] joints_deg in '
-            f"campaign.toml, or state the feed."
-        )
-    return cut
 
 
 def examine_robot(robot_toml: Path, campaign_toml: Path | None = None) -> Examination:

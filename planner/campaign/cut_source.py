@@ -1,6 +1,6 @@
 """What `stability` and `couple` start from: files or a campaign, this tool or another."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -28,7 +28,9 @@ class StabilityRequest:
 
     With `tool` the FRFs are coupled to it first, as `couple` does: `reference` is the tested one,
     `robot` whose simulation tells how the tip turns, `noise` the relative sd of FRFs whose file
-    states none. `peak_force_n` is that of hits for which a campaign's joints are linearised.
+    states none. `peak_force_n` is that of hits for which a campaign's joints are linearised. A
+    campaign's `path` is a table of poses or a program: then `origin` is its zero, `poses` how many
+    are looked at; `turns`: about the tool's axis, too.
     """
 
     source: Path
@@ -42,6 +44,10 @@ class StabilityRequest:
     noise: float = 0.0
     from_names: bool = False  # FRFs' places from the names of their files
     peak_force_n: float | None = None
+    path: Path | None = None
+    origin: str | None = None
+    poses: int = 12
+    turns: bool = False
 
     @property
     def wanted(self) -> tuple[float, float] | None:
@@ -134,38 +140,35 @@ def structure_of(asked: StabilityRequest, cut: Cut) -> Structure:
     if is_campaign(source):
         campaign = asked.campaign
         q = campaign.posture(asked.pose)
-        (found,) = at_poses(campaign, (str(asked.pose),), q[None], cut, change)
-        said = *outside(campaign, (str(asked.pose),), q[None]), *beyond_the_tip(campaign, cut)
-        return _with(found, said)
+        at = CampaignPoses(campaign, (str(asked.pose),), q[None], change)
+        ((_, found),) = at.structures(cut)
+        return _with(found, at.remarks(cut))
     if asked.peak_force_n is not None:
         raise InputError(
             f"--peak-force-n goes with a campaign, which {source} is not; predict its FRFs at that "
             f"force and name the npz."
         )
     no_pose(cut, source)
-    if change is not None:
-        return _coupled(asked, change, asked.pose, cut)
-    if source.suffix.lower() == ".toml":
+    if change is None and source.suffix.lower() == ".toml":
         if asked.pose is not None:
             raise InputError(f"{source} states modes of one pose; leave --pose out.")
         return of_modes(load_mode_file(source), cut)
-    return of_frf(read_frf(source, asked.pose, asked.from_names), cut)
+    return _of_frfs(asked, change, asked.pose, cut)
 
 
 def structures_of_file(asked: StabilityRequest, cut: Cut) -> list[tuple[str, Structure]]:
     """Every pose of an npz."""
-    change = ToolChange.of(asked, cut)
-    no_pose(cut, asked.source)
-    names = names_in(asked.source)
-    each = (
-        of_frf(read_frf(asked.source, name), cut)
-        if change is None else _coupled(asked, change, name, cut)
-        for name in names
-    )  # fmt: skip
-    return list(zip([name or asked.source.stem for name in names], each, strict=True))
+    change, source = ToolChange.of(asked, cut), asked.source
+    no_pose(cut, source)
+    names = names_in(source)
+    return [(name or source.stem, _of_frfs(asked, change, name, cut)) for name in names]
 
 
-def _coupled(asked: StabilityRequest, change: ToolChange, pose: str | None, cut: Cut) -> Structure:
+def _of_frfs(
+    asked: StabilityRequest, change: ToolChange | None, pose: str | None, cut: Cut
+) -> Structure:
+    if change is None:
+        return of_frf(read_frf(asked.source, pose, asked.from_names), cut)
     tip, name = tip_of(
         asked.source, change.tested, pose, asked.robot, asked.noise, asked.from_names
     )
@@ -173,47 +176,61 @@ def _coupled(asked: StabilityRequest, change: ToolChange, pose: str | None, cut:
     return _with(of_frf(frf, cut), remarks)
 
 
-def at_poses(
-    campaign: Campaign, names: Sequence[str], q: np.ndarray, cut: Cut,
-    change: ToolChange | None, feeds: np.ndarray | None = None,
-) -> list[Structure]:  # fmt: skip
-    """What a campaign predicts at poses q (p, dof) in rad, in the plane of the cut there.
+@dataclass(frozen=True, eq=False)
+class CampaignPoses:
+    """p named poses q (p, dof) of a campaign in rad, with feeds (p, 3) in the base if known.
 
-    `feeds` (p, 3) in the base frame, where a program gives them; else as the cut says.
-    Raises OutOfBandError where the cut would chatter outside the lines at one of them.
+    FRFs there are those that it predicts, of the tool that is put on where there is a `change`.
     """
-    found = []
-    for one in at_poses_in_band(campaign, names, q, cut, change, feeds):
-        if isinstance(one, OutOfBandError):
-            raise one
-        found.append(one)
-    return found
 
+    campaign: Campaign
+    names: tuple[str, ...]
+    q: np.ndarray
+    change: ToolChange | None
+    feeds: np.ndarray | None = None
 
-def at_poses_in_band(
-    campaign: Campaign, names: Sequence[str], q: np.ndarray, cut: Cut,
-    change: ToolChange | None, feeds: np.ndarray | None = None,
-) -> Iterator[Structure | OutOfBandError]:  # fmt: skip
-    """As `at_poses`, but for poses where the cut would chatter outside the lines: they say so."""
-    lines, simulated = campaign.frequency_lines, campaign.state.simulated
-    rotation, position = campaign.cell.robot.forward_batch(q)
-    if feeds is not None and cut.feed_in == "path":
-        cuts = [turned_to(cut, *row) for row in zip(rotation, feeds, names, strict=True)]
-    else:
-        cuts = cuts_at(cut, rotation, position, names)
-    at_tip = tip_frfs(campaign, q, lines) if change is None else None
-    for i, name in enumerate(names):
-        where, remarks = f"{campaign.directory}, pose {name}", ()
-        if at_tip is not None:
-            frf = of_accelerance(where, lines, at_tip[0][i], at_tip[1][i])
+    def structures(self, cut: Cut) -> list[tuple[str, Structure]]:
+        """By name, each in the plane of the cut there, whose feed is that of a program if known.
+
+        Raises OutOfBandError where the cut would chatter outside the lines at one of them.
+        """
+        found = []
+        for name, one in zip(self.names, self.in_band(cut), strict=True):
+            if isinstance(one, OutOfBandError):
+                raise one
+            found.append((name, one))
+        return found
+
+    def in_band(self, cut: Cut) -> Iterator[Structure | OutOfBandError]:
+        """The same, pose by pose; one where the cut would chatter outside the lines says so."""
+        campaign, lines = self.campaign, self.campaign.frequency_lines
+        rotation, position = campaign.cell.robot.forward_batch(self.q)
+        if self.feeds is not None and cut.feed_in == "path":
+            turned = zip(rotation, self.feeds, self.names, strict=True)
+            cuts = [turned_to(cut, *row) for row in turned]
         else:
-            assert change is not None
-            tip = tip_at(campaign, name, q[i], lines)
-            frf, remarks = change.coupled(tip, where)
-        try:
-            yield _with(of_frf(replace(frf, simulated=simulated), cuts[i]), remarks)
-        except OutOfBandError as error:
-            yield error
+            cuts = cuts_at(cut, rotation, position, self.names)
+        at_tip = tip_frfs(campaign, self.q, lines) if self.change is None else None
+        for i, name in enumerate(self.names):
+            where, remarks = f"{campaign.directory}, pose {name}", ()
+            if at_tip is not None:
+                frf = of_accelerance(where, lines, at_tip[0][i], at_tip[1][i])
+            else:
+                assert self.change is not None
+                tip = tip_at(campaign, name, self.q[i], lines)
+                frf, remarks = self.change.coupled(tip, where)
+            frf = replace(frf, simulated=campaign.state.simulated)
+            try:
+                yield _with(of_frf(frf, cuts[i]), remarks)
+            except OutOfBandError as error:
+                yield error
+
+    def remarks(self, cut: Cut) -> tuple[str, ...]:
+        """On those that lie outside the workspace, and on the side of the tip that is cut from."""
+        there = self.campaign.cell.inside(self.q)
+        beyond = [name for name, one in zip(self.names, there, strict=True) if not one]
+        said = outside_remark(beyond)
+        return (*([said] if said else []), *beyond_the_tip(self.campaign, cut))
 
 
 def tip_frfs(campaign: Campaign, q: np.ndarray, lines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -230,13 +247,6 @@ def tip_frfs(campaign: Campaign, q: np.ndarray, lines: np.ndarray) -> tuple[np.n
     tip = simulation.frfs(q, lines, sensors=(robot.config.tcp_frame,))[:, 0, :, 0]
     size, was = (np.linalg.norm(h, axis=(1, 2), keepdims=True) for h in (tip, there))
     return mean + tip - there, sd * size / np.where(was > 0, was, 1.0)
-
-
-def outside(campaign: Campaign, names: Sequence[str], q: np.ndarray) -> tuple[str, ...]:
-    """A remark on those of the poses q (p, dof) in rad that lie outside the workspace, if any."""
-    there = campaign.cell.inside(q)
-    said = outside_remark([name for name, one in zip(names, there, strict=True) if not one])
-    return (said,) if said else ()
 
 
 def beyond_the_tip(campaign: Campaign, cut: Cut) -> tuple[str, ...]:

@@ -92,10 +92,15 @@ class CampaignHitErrors:
     @property
     def poses(self) -> dict[str, tuple[HitErrorEstimate, ...]]:
         """Hit by hit, by pose; none where the simulation is too wrong to tell."""
-        if self.fitted is None or not self.trusted:
+        return {pose: _pose(*each) for pose, each in self._told.items()} if self.trusted else {}
+
+    @property
+    def _told(self) -> dict[str, tuple[Visited, VisitHitErrors]]:
+        """By pose, whether or not it is to be trusted."""
+        if self.fitted is None:
             return {}
         both = zip(self.visited, self.fitted.visits, strict=True)
-        return {visited.pose: _pose(visited, told) for visited, told in both}
+        return {visited.pose: (visited, told) for visited, told in both}
 
     def corrected(self, labelled: LabelledPose, measured: Measurement) -> LabelledPose:
         """A measured pose's labelled modes with residues as `without_hit_errors` gives them."""
@@ -110,10 +115,9 @@ class CampaignHitErrors:
         What stays unsure is in their sds. Poles and shapes of response do not depend on where and
         how the robot is hit. Where the simulation is too wrong to tell, residues are as measured.
         """
-        names = [visited.pose for visited in self.visited]
-        if self.fitted is None or pose not in names or not modes:
+        if pose not in self._told or not modes:
             return list(modes)
-        visited, told = self.visited[names.index(pose)], self.fitted.visits[names.index(pose)]
+        visited, told = self._told[pose]
         if not self.trusted:
             return [_unsure(mode, visited.columns, self.tolerances) for mode in modes]
         return self._moved(modes, visited, told)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.campaign.events import HitRecord, Imported, MeasuredMode, Question
+from planner.campaign.events import Imported, MeasuredMode, Question
 from planner.campaign.labels import found_modes
 from planner.campaign.model import FEW_POSES, Model
 from planner.campaign.state import CampaignState, Measurement
@@ -47,6 +47,18 @@ class Claim:
         """In which modes are looked for."""
         return self.model.cell.config.modes.band_hz
 
+    @property
+    def setpoint_deg(self) -> tuple[float, ...]:
+        """Where the robot was sent; `joints_deg` where nothing was proposed."""
+        proposal = self.state.proposals.get(self.pose)
+        return proposal.joints_deg if proposal else self.joints_deg
+
+    @property
+    def displacement(self) -> str:
+        """A sentence if the robot stood elsewhere than it was sent; else ""."""
+        off = self.joints.apart(self.setpoint_deg, self.joints_deg)
+        return f"The readback of {self.pose} is up to {off} from its setpoint." if off else ""
+
 
 def question_about(claim: Claim, measured: MeasuredPose) -> Question | None:
     """Of the first pose's hits whether the chain can be so; of others, whether pose and chain can.
@@ -69,15 +81,10 @@ def question_about(claim: Claim, measured: MeasuredPose) -> Question | None:
 
 def _far_from_setpoint(claim: Claim) -> Question | None:
     """What to ask of a readback far from the pose that was proposed, before FRFs can tell."""
-    proposal = claim.state.proposals.get(claim.pose)
-    if proposal is None:
-        return None
-    away = np.abs(np.subtract(proposal.joints_deg, claim.joints_deg)) / claim.joints.same()
+    away = np.abs(np.subtract(claim.setpoint_deg, claim.joints_deg)) / claim.joints.same()
     if np.max(away) < FAR:
         return None
-    off = claim.joints.apart(proposal.joints_deg, claim.joints_deg)
-    text = f"The readback of {claim.pose} is up to {off} from its setpoint. Is it right as stated?"
-    return Question(text, about="readback")
+    return Question(f"{claim.displacement} Is it right as stated?", about="readback")
 
 
 def _unstated_window(claim: Claim, measured: MeasuredPose) -> Question | None:
@@ -166,7 +173,9 @@ LEAST_MODES = 2  # that have to lie to one side
 
 def hit_again(model: Model, known: Measurement, modes: Sequence[MeasuredMode]) -> tuple[str, ...]:
     """A remark on what further hits at a measured pose show beside those before."""
-    scatter = np.sqrt(2) * _scatter(model)
+    # Of few poses one that has drifted makes the scatter of visits as large as the drift.
+    told = len(model.labelled) >= FEW_POSES
+    scatter = np.sqrt(2 * np.mean(model.surrogate.visit_scatter**2)) if told else 0.0
     before = [
         (mode.frequency_hz, float(np.hypot(mode.frequency_sd_hz / mode.frequency_hz, scatter)))
         for mode in known.modes if mode.likely
@@ -201,7 +210,9 @@ def suspected_drift(claim: Claim, modes: Sequence[MeasuredMode]) -> tuple[str, s
     one_sided = abs(np.sum(np.sign(off))) == len(off) >= LEAST_MODES
     if not one_sided or np.any(in_sd < SUSPECT_SD) or np.mean(np.abs(off)) < SMALLEST:
         return "", ""
-    early = _telling(state)
+    # Of the earlier half, since which the robot has changed most, the pose with most modes.
+    half = state.used[: (len(state.used) + 1) // 2]
+    early = max(half, key=lambda m: sum(mode.likely for mode in m.modes))
     which = "the first pose" if early is state.used[0] else "an early pose"
     return (
         early.pose,
@@ -235,25 +246,6 @@ def unexpected_modes(before: Model, model: Model, pose: str) -> tuple[str, ...]:
     )
 
 
-def _telling(state: CampaignState) -> Measurement:
-    """Of the earlier half of what was measured, the pose with most modes; of these the first.
-
-    Since then the robot has changed most.
-    """
-    half = state.used[: (len(state.used) + 1) // 2]
-    return max(half, key=lambda m: sum(mode.likely for mode in m.modes))
-
-
-def _scatter(model: Model) -> float:
-    """Sd of ln f from visit to visit over all modes; 0 before enough poses have told it.
-
-    Of few poses one that has drifted makes it as large as the drift.
-    """
-    if len(model.labelled) < FEW_POSES:
-        return 0.0
-    return float(np.sqrt(np.mean(model.surrogate.visit_scatter**2)))
-
-
 def _found_again(
     expected: Sequence[tuple[float, float]], modes: Sequence[MeasuredMode]
 ) -> list[tuple[float, float, float]]:
@@ -266,10 +258,6 @@ def _found_again(
             own = likely[k].frequency_sd_hz / likely[k].frequency_hz
             found.append((hz, off[k], float(np.hypot(sd, own))))
     return found
-
-
-def _axes(hits: Sequence[HitRecord]) -> set[str]:
-    return {hit.hit[-1] for hit in hits if hit.accepted and hit.hit}
 
 
 def alerts(
@@ -293,6 +281,6 @@ def alerts(
     known = claim.state.hit_at(event.pose)
     if known is not None:
         # Modes of fewer axes are others: what was lacking of a visit is no second one.
-        whole = _axes(event.hits) >= _axes(known.hits)
+        whole = {hit.hit[-1] for hit in event.hits if hit.accepted and hit.hit} >= known.axes
         return told + (hit_again(claim.model, known, modes) if whole else ())
     return (*told, drift) if drift else told

@@ -11,28 +11,12 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
-from planner.campaign import events
+from planner.campaign import events, import_checks, imported_files
 from planner.campaign.cell import Cell
 from planner.campaign.events import REFUSED, HitRecord, Question
 from planner.campaign.hit_errors import HitErrorEstimate
-from planner.campaign.import_checks import (
-    Claim,
-    alerts,
-    contradiction,
-    question_about,
-    suspected_drift,
-    unexpected_modes,
-)
-from planner.campaign.imported_files import (
-    ImportedFiles,
-    KnownFile,
-    at_their_poses,
-    new_files,
-    record_of,
-    replaced_hits,
-    sort_paths,
-    superseded,
-)
+from planner.campaign.import_checks import Claim, contradiction, question_about
+from planner.campaign.imported_files import ImportedFiles, KnownFile, record_of, superseded
 from planner.campaign.labels import from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement, without_entries
@@ -182,18 +166,9 @@ def remarks_on(
             for hit in judged.hits
             if hit.sha256 in state.refused
         ),
-        *displacement(claim),
+        *filter(None, (claim.displacement,)),
         *axes_not_hit(state, measurement),
     )
-
-
-def displacement(claim: Claim) -> tuple[str, ...]:
-    """A remark if the robot stood elsewhere than proposed."""
-    proposal = claim.state.proposals.get(claim.pose)
-    off = proposal and claim.joints.apart(proposal.joints_deg, claim.joints_deg)
-    if not off:
-        return ()
-    return (f"The readback of {claim.pose} is up to {off} from its setpoint.",)
 
 
 def axes_not_hit(state: CampaignState, measurement: Measurement) -> tuple[str, ...]:
@@ -229,8 +204,9 @@ def import_paths(
     # A folder that has the name of an open proposal is of that pose.
     open_ = [p for p in state.open if len(given) == 1 and given[0].is_dir() and given[0].name == p]
     default = (open_ or state.open)[0] if len(open_ or state.open) == 1 else None
-    deliveries = sort_paths(given, cell.robot, pose, default)
-    placed = [(d, readback_of(cell, state, d)) for d in at_their_poses(deliveries, state)]
+    deliveries = imported_files.sort_paths(given, cell.robot, pose, default)
+    deliveries = imported_files.at_their_poses(deliveries, state)
+    placed = [(d, readback_of(cell, state, d)) for d in deliveries]
     named = frozenset(path for path in given if path.is_file())
     reports = []
     for number, (delivery, joints_deg) in enumerate(placed):
@@ -251,7 +227,7 @@ def _held_before(
     instead = []
     for held_at in campaign.state.held:
         entry, event = campaign.held_import(held_at)
-        lacks = replaced_hits(delivery, event, campaign.cell.robot.joints)
+        lacks = imported_files.replaced_hits(delivery, event, campaign.cell.robot.joints)
         if lacks is not None:
             instead.append(entry.seq)
             more = tuple(map(campaign.recordings.source, lacks))
@@ -268,7 +244,7 @@ def import_pose(
     instead, delivery = _held_before(campaign, delivery)
     before, state = campaign.model, without_entries(campaign.entries, instead)
     known = state.hit_at(pose)
-    fresh, already, left_out = new_files(campaign.directory, delivery, state, named)
+    fresh, already, left_out = imported_files.new_files(campaign.directory, delivery, state, named)
     judged, refused_again = judged_files(campaign.recordings, state, pose, fresh)
     left_out += refused_again
     if judged is None:
@@ -285,7 +261,7 @@ def import_pose(
     stood = replaced(claim, joints_deg=joints_deg)
     remarks = remarks_on(stood, judged, measurement, told)
     if not event.question and any(hit.accepted for hit in judged.hits):
-        remarks += (*unexpected_modes(before, model, pose), *model.remarks)
+        remarks += (*import_checks.unexpected_modes(before, model, pose), *model.remarks)
     return ImportReport(
         pose, measurement, before, model, judged.hits, event.question, already, left_out,
         judged.measured, remarks, alerts=told, refit_seconds=time.perf_counter() - started,
@@ -302,7 +278,7 @@ def _event(claim: Claim, judged: JudgedFiles) -> tuple[events.Imported, tuple[st
     asked = contradiction(claim.pose, measured, len(judged.old)) or question_about(claim, alone)
     again, drift = "", ""
     if asked is None:
-        again, drift = suspected_drift(claim, new_modes)
+        again, drift = import_checks.suspected_drift(claim, new_modes)
     event = events.Imported(
         pose=claim.pose,
         joints_deg=claim.joints_deg,
@@ -314,4 +290,4 @@ def _event(claim: Claim, judged: JudgedFiles) -> tuple[events.Imported, tuple[st
         again=again,
         replaced=tuple(hit.sha256 for hit in judged.superseded),
     )
-    return event, alerts(claim, event, measured, new_modes, drift)
+    return event, import_checks.alerts(claim, event, measured, new_modes, drift)

@@ -190,29 +190,26 @@ class Journal:
     def _repair_tail(self) -> None:
         content = self._content
         remove_parts(self.path.parent)
+        if not (content.torn or content.newline_missing):
+            return
         if content.torn:
             aside = self.path.with_name(f"{self.path.name}.torn-{content.whole_bytes}")
             write_synced(aside, content.torn)
             with open(self.path, "r+b") as file:
                 file.truncate(content.whole_bytes)
                 os.fsync(file.fileno())
-        elif content.newline_missing:
+        else:
             _append_synced(self.path, b"\n")
-        self._content = LogContent(content.entries, content.check, content.whole_bytes, b"")
+        self._content = self._load()
 
     def append(self, event: AnyEvent) -> Entry:
         """Write one event and return only once it is on the disk."""
         content = self._content
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         entry = Entry(len(content.entries) + 1, now, event)
-        line, check = encode_line(content.check, entry)
-        _append_synced(self.path, line)
-        whole = content.whole_bytes + len(line)
-        # Decoded again, so that what is used now is what a later reading will give.
-        decoded, _ = _read_line(line, content.check, entry.seq, str(self.path))
-        assert decoded is not None
-        self._content = LogContent((*content.entries, decoded), check, whole, b"")
-        return decoded
+        _append_synced(self.path, encode_line(content.check, entry)[0])
+        self._content = self._load()  # what is used now is what a later reading will give
+        return self.entries[-1]
 
 
 def _who() -> str:

@@ -28,11 +28,6 @@ class PointShapes:
     place_m: np.ndarray  # (n, 3)
     motion: np.ndarray
 
-    def scaled(self, size: np.ndarray | float) -> "PointShapes":
-        """With mode k's motion multiplied by size[k]."""
-        factor = np.broadcast_to(size, len(self.motion))[:, None, None]
-        return PointShapes(self.names, self.place_m, factor * self.motion)
-
 
 def simulated_shapes(
     simulation: Simulation, q: np.ndarray, drawn: Skeleton, layout: Layout, count: int
@@ -131,13 +126,13 @@ def matched(measured: PointShapes, simulated: PointShapes) -> PointShapes:
         power = np.sum(np.abs(own[known]) ** 2)
         if power > 0:
             size[k] = np.sum(own[known].conj() * other[known]) / power
-    return measured.scaled(size)
+    return replace(measured, motion=size[:, None, None] * measured.motion)
 
 
 def measured_alone(measured: PointShapes) -> PointShapes:
     """The measured shapes with the point that moves most moving by 1, at the first instant."""
-    size = [
-        realign(known) / np.max(np.abs(known)) if known.size else 1.0
-        for known in (own[np.isfinite(own)] for own in measured.motion)
-    ]
-    return measured.scaled(np.array(size))
+    motion = measured.motion.copy()
+    for own in motion:
+        known = own[np.isfinite(own)]
+        own *= realign(known) / np.max(np.abs(known)) if known.size else 1.0
+    return replace(measured, motion=motion)

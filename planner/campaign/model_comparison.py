@@ -7,7 +7,6 @@ identified from all poses: that helps all models that use it alike.
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -40,6 +39,10 @@ class LeftOutModel:
     campaign: bool = False
 
 
+# Mean and sd (m,) of ln f at the pose left out; evidence of all, seconds of the fit.
+Fitted = tuple[np.ndarray, np.ndarray, float | None, float]
+
+
 def compared_models(
     model: Model, progress: ProgressCallback = no_progress
 ) -> tuple[LeftOutModel, ...]:
@@ -48,44 +51,29 @@ def compared_models(
     usable = [m for m in MODELS if model.low.simulation or not MODELS[m].simulation]
     if n < 2:
         return ()
-    items = [(name, left) for name in usable for left in range(-1, n)]
+    seen, discrepancy, belief = model.seen, model.low.discrepancy, model.low.belief
+    kernel = config.surrogate.kernel
     points = {name: simulated_elsewhere(model.cell, model.low, name) for name in usable}
-    fit = partial(
-        _without, model.seen, model.low.discrepancy, model.low.belief, config.surrogate.kernel,
-        points,
-    )  # fmt: skip
-    done = parallel_map(fit, items, lambda i, k: progress(items[i][0], k / len(items)))
+
+    def without(item: tuple[str, int]) -> Fitted:
+        """A model fitted without one pose (−1: to all), and what it says there."""
+        (name, left), started = item, time.perf_counter()
+        kept, there = np.arange(n) != left, seen[max(left, 0) : max(left, 0) + 1]
+        primary = fit_primary(
+            seen[kept], discrepancy, belief, model=name, kernel=kernel, elsewhere=points[name]
+        )
+        mean, sd = primary.predict(there.x, np.log(there.simulated.frequency_hz), nugget=True)
+        evidence = float(primary.log_evidence.sum()) if type(primary) is Average else None
+        return mean[0], sd[0], evidence, time.perf_counter() - started
+
+    items = [(name, left) for name in usable for left in range(-1, n)]
+    done = parallel_map(without, items, lambda i, k: progress(items[i][0], k / len(items)))
     found = dict(zip(items, done, strict=True))
     rows = [
-        _row(name, model.seen, found[name, -1][2], [found[name, i] for i in range(n)])
-        for name in usable
+        _row(name, seen, found[name, -1][2], [found[name, i] for i in range(n)]) for name in usable
     ]
     rows = [replace(row, campaign=row.model == config.surrogate.model) for row in rows]
     return tuple(sorted(rows, key=lambda row: -row.log_density))
-
-
-# Mean and sd (m,) of ln f at the pose left out; evidence of all, seconds of the fit.
-Fitted = tuple[np.ndarray, np.ndarray, float | None, float]
-
-
-def _without(
-    seen: ModalObservations,
-    discrepancy: np.ndarray | None,
-    belief: float,
-    kernel: str | None,
-    points: dict[str, tuple[np.ndarray, np.ndarray] | None],
-    item: tuple[str, int],
-) -> Fitted:
-    """A model fitted without one pose (−1: to all), and what it says there."""
-    (name, left), started = item, time.perf_counter()
-    kept = np.arange(len(seen.x)) != left
-    primary = fit_primary(
-        seen[kept], discrepancy, belief, model=name, kernel=kernel, elsewhere=points[name]
-    )
-    there = seen[max(left, 0) : max(left, 0) + 1]
-    mean, sd = primary.predict(there.x, np.log(there.simulated.frequency_hz), nugget=True)
-    evidence = float(primary.log_evidence.sum()) if type(primary) is Average else None
-    return mean[0], sd[0], evidence, time.perf_counter() - started
 
 
 def _row(

@@ -14,17 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.campaign.alternatives import (
-    LOG_ODDS,
-    Alternative,
-    StatedHits,
-    chain_faults,
-    far_off_hits,
-    flipped_signs,
-    instead,
-    joint_offsets,
-    other_tool,
-)
+from planner.campaign import alternatives
+from planner.campaign.alternatives import LOG_ODDS, Alternative, StatedHits
 from planner.campaign.chain_mismatch import chain_mismatch
 from planner.campaign.events import Question
 from planner.campaign.import_checks import Claim
@@ -63,15 +54,15 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
     said = "".join(answered)  # not asked again
     likely = _setpoint(claim)
     if sure and frf.layout == TOOL:
-        known = [far_off_hits(expected, q), *([other_tool(expected, q)] if placed else [])]
-        likely += (one for one in known if one.what not in said)
+        free = alternatives.loose(expected, q, placed)
+        likely += (one for one in free if one.what not in said)
     if stated.agree(likely):
         return None
     mistakes = [*likely, *_poses(claim)]
     if sure:
-        mistakes += flipped_signs(claim.joints, claim.joints_deg)
-        mistakes += joint_offsets(claim.joints, expected, frf, claim.joints_deg)
-    mistakes += (m for m in chain_faults(expected, q, frf, sure) if m.what not in said)
+        mistakes += alternatives.flipped_signs(claim.joints, claim.joints_deg)
+        mistakes += alternatives.joint_offsets(claim.joints, expected, frf, claim.joints_deg)
+    mistakes += (m for m in alternatives.chain_faults(expected, q, frf, sure) if m.what not in said)
     fits = stated.best_alternative(mistakes)
     # Another known pose, or the setpoint, is none by chance; any angle may be, of this pose or of
     # one before.
@@ -105,11 +96,10 @@ def _poses(claim: Claim) -> Iterator[Alternative]:
 
 def _setpoint(claim: Claim) -> list[Alternative]:
     """Where the robot was sent, where that is not what is stated."""
-    joints, pose, joints_deg = claim.joints, claim.pose, claim.joints_deg
-    proposal = claim.state.proposals.get(pose)
-    sent = proposal.joints_deg if proposal else joints_deg
+    joints, pose = claim.joints, claim.pose
+    sent, joints_deg = claim.setpoint_deg, claim.joints_deg
     typed = np.flatnonzero(np.abs(np.subtract(sent, joints_deg)) > joints.same()).tolist()
-    which = " ".join(instead(joints, i, sent[i], joints_deg[i]) for i in typed)
+    which = " ".join(alternatives.instead(joints, i, sent[i], joints_deg[i]) for i in typed)
     what = f"fit the setpoint of {pose} ({which.rstrip(',')}) better than its readback."
     if np.all(np.abs(np.rad2deg(joints_deg) - sent) < NEAR_DEG):
         what = f"fit the setpoint of {pose} better than its readback: are its angles in radians?"
@@ -231,9 +221,9 @@ class PosesTogether:
         expected = ExpectedFrfs(RobotPosterior.of(self._fit(self.q, others)), self.band_hz)
         stated = tuple(self.joints.shown(self.q[i]))
         hits = StatedHits(expected, self.q[i], self.frfs[i], len(others) >= PLACED)
-        typed = [*likely, *flipped_signs(self.joints, stated)]
+        typed = [*likely, *alternatives.flipped_signs(self.joints, stated)]
         if len(others) >= SURE and not hits.agree():
-            typed += joint_offsets(self.joints, expected, self.frfs[i], stated)
+            typed += alternatives.joint_offsets(self.joints, expected, self.frfs[i], stated)
         return hits.best_alternative(typed)
 
     def _evidence(self, one: tuple[int, Alternative] | None) -> tuple[float, bool]:

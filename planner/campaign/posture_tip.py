@@ -102,17 +102,15 @@ def _followed(matrices: list[FrfMatrix], dofs: list[Dof], x: np.ndarray) -> list
         raise InputError("No posture's FRFs show a mode; check that their band holds a resonance.")
     short = [[replace(m, shape=v[0][:3] / np.linalg.norm(v[0][:3])) for m, v in one]
              for one in found]  # fmt: skip
+    both = zip(short, found, strict=True)
+    pair_of = {id(m): pair for one, own in both for m, pair in zip(one, own, strict=True)}
     tracks = track(short, Guide.by_example(short), x, ordered=True)
     followed = []
     for label in range(tracks.probability.shape[1]):
         rows = [i for i, row in enumerate(tracks.modes) if row[label] is not None]
         if 2 * len(rows) <= len(x):
             continue
-        pairs = [
-            next(pair for pair, m in zip(found[i], short[i], strict=True)
-                 if m is tracks.modes[i][label])
-            for i in rows
-        ]  # fmt: skip
+        pairs = [pair_of[id(tracks.modes[i][label])] for i in rows]
         followed.append((x[rows], _parameters(pairs)))
     if not followed:
         raise InputError("No mode is found in most postures; hit postures nearer to each other.")

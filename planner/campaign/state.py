@@ -6,25 +6,8 @@ from pathlib import Path
 
 import msgspec
 
-from planner.campaign.events import (
-    AnyEvent,
-    Configured,
-    Confirmed,
-    Entry,
-    FilesPlaced,
-    FilesShown,
-    HitRecord,
-    Imported,
-    MeasuredMode,
-    Proposal,
-    Proposed,
-    Question,
-    Refused,
-    Skipped,
-    Starred,
-    Undone,
-    Withdrawn,
-)
+from planner.campaign import events
+from planner.campaign.events import AnyEvent, Entry, HitRecord, MeasuredMode, Proposal, Question
 from planner.modal.modes import Homogeneity
 
 
@@ -81,7 +64,7 @@ class Measurement:
 class CampaignState:
     """Everything the log says; a value."""
 
-    configured: Configured | None = None
+    configured: events.Configured | None = None
     proposals: dict[str, Proposal] = field(default_factory=dict)  # all ever made, undone ones too
     open: tuple[str, ...] = ()  # proposed and not yet measured, skipped or superseded
     proposed_by: str = ""  # acquisition that made the open proposals
@@ -133,9 +116,11 @@ class CampaignState:
 
     def unchanged_by(self, event: AnyEvent) -> bool:
         """Whether an act changes neither the model nor what is proposed."""
-        if isinstance(event, Imported):
+        if isinstance(event, events.Imported):
             return event.question is not None or event.unhit
-        return isinstance(event, Starred | Refused | FilesShown | FilesPlaced)
+        return isinstance(
+            event, events.Starred | events.Refused | events.FilesShown | events.FilesPlaced
+        )
 
     @property
     def simulated(self) -> bool:
@@ -154,13 +139,13 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
     undone = taken_back(entries)
     state = CampaignState()
     for entry in entries:
-        if isinstance(entry.event, Proposed):
+        if isinstance(entry.event, events.Proposed):
             made = {p.pose: p for p in entry.event.proposals}
             # A pose that is proposed again keeps its name.
             numbers = [int(pose[1:]) for pose in made if pose[1:].isdecimal()]
             count = max([state.proposals_made, *numbers])
             state = replace(state, proposals_made=count, proposals=state.proposals | made)
-        if isinstance(entry.event, Undone):
+        if isinstance(entry.event, events.Undone):
             if not all(map(state.unchanged_by, _acts_of(entries, entry.event))):
                 state = replace(state, model_version=entry.seq)
         elif entry.seq not in undone:
@@ -171,7 +156,7 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
 
 def without_entries(entries: Sequence[Entry], acts: tuple[int, ...]) -> CampaignState:
     """The state as if the acts of these numbers were taken back."""
-    return fold([*entries, Entry(len(entries) + 1, "", Undone(acts))] if acts else entries)
+    return fold([*entries, Entry(len(entries) + 1, "", events.Undone(acts))] if acts else entries)
 
 
 def taken_back(entries: Sequence[Entry]) -> frozenset[int]:
@@ -181,16 +166,16 @@ def taken_back(entries: Sequence[Entry]) -> frozenset[int]:
         event = entry.event
         if entry.seq in found:
             continue
-        if isinstance(event, Undone):
+        if isinstance(event, events.Undone):
             found.update(event.acts)
-        elif isinstance(event, Imported | Refused):
+        elif isinstance(event, events.Imported | events.Refused):
             found.update(event.instead)
     return frozenset(found)
 
 
 def _acts_of(entries: Sequence[Entry], event: AnyEvent) -> Iterator[AnyEvent]:
     """What an Undone is about in the end, an undo of an undo too."""
-    if not isinstance(event, Undone):
+    if not isinstance(event, events.Undone):
         yield event
         return
     for act in event.acts:
@@ -200,51 +185,51 @@ def _acts_of(entries: Sequence[Entry], event: AnyEvent) -> Iterator[AnyEvent]:
 def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState:
     changed = replace(state, stale=True, model_version=entry.seq)
     match event:
-        case Configured():
+        case events.Configured():
             return replace(changed, configured=event)
-        case Proposed():
+        case events.Proposed():
             return replace(
                 state,
                 open=tuple(p.pose for p in event.proposals),
                 proposed_by=event.acquisition,
                 stale=False,
             )
-        case Imported():
+        case events.Imported():
             return _imported(state, changed, event, entry)
-        case Confirmed():
+        case events.Confirmed():
             held = {pose: m for pose, m in state.held.items() if pose != event.pose}
             known = state.held.get(event.pose) or state.measurements[event.pose]
             measurements = {**state.measurements, event.pose: replace(known, withdrawn=False)}
             return replace(changed, measurements=measurements, held=held)
-        case Refused():
+        case events.Refused():
             hits = {hit.sha256: (event.pose, hit) for hit in event.hits}
             return replace(state, refused={**state.refused, **hits})
-        case Withdrawn():
+        case events.Withdrawn():
             measurement = replace(state.measurements[event.pose], withdrawn=True)
             measurements = {**state.measurements, event.pose: measurement}
             return replace(changed, measurements=measurements, doubt=_doubt(state, event.pose))
-        case Skipped():
+        case events.Skipped():
             left = tuple(pose for pose in state.open if pose != event.pose)
             avoided = state.avoided | ({event.pose} if event.neighbours else set())
             skipped = {**state.skipped, event.pose: event.reason}
             doubt = _doubt(state, event.pose)
             return replace(changed, open=left, skipped=skipped, avoided=avoided, doubt=doubt)
-        case FilesShown():
+        case events.FilesShown():
             new = [file for file in event.files if file not in state.shown]
             guessed = state.guessed | (dict.fromkeys(new, event.at) if event.at else {})
             shown = state.shown | dict.fromkeys(new, event.pose)
             return replace(state, shown=shown, guessed=guessed)
-        case FilesPlaced():
+        case events.FilesPlaced():
             guessed = {file: at for file, at in state.guessed.items() if file not in event.files}
             shown = state.shown | dict.fromkeys(event.files, event.pose)
             return replace(state, shown=shown, guessed=guessed)
-        case Starred():
+        case events.Starred():
             return replace(state, starred=state.starred | {event.pose})
     return state
 
 
 def _imported(
-    state: CampaignState, changed: CampaignState, event: Imported, entry: Entry
+    state: CampaignState, changed: CampaignState, event: events.Imported, entry: Entry
 ) -> CampaignState:
     came = {hit.sha256 for hit in event.hits}
     # Refused hits of files that come again are judged again.

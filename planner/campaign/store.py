@@ -13,8 +13,8 @@ from tomlkit.exceptions import TOMLKitError
 
 from planner import content_hash, file_content
 from planner.campaign.config import load_campaign_config
-from planner.campaign.events import HitRecord
-from planner.campaign.journal import sync_folder, write_synced
+from planner.campaign.events import Configured, HitRecord
+from planner.campaign.journal import Journal, sync_folder, write_synced
 from planner.campaign.state import Measurement
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store
@@ -132,7 +132,7 @@ def create_folder(
     directory: Path,
     robot_toml: Path,
     campaign_toml: Path | None,
-    first_line: Callable[[Path], bytes],
+    first_event: Callable[[Path], Configured],
 ) -> None:
     """Make the campaign folder: robot folder copied in, campaign.toml taken over, log begun.
 
@@ -154,7 +154,8 @@ def create_folder(
             load_campaign_config(campaign_toml)  # says what is wrong with it
         text = _taken_over(campaign_toml, robot) if campaign_toml else _default(partial, robot)
         (partial / CONFIG).write_text(text, encoding="utf-8")
-        write_synced(partial / LOG, first_line(partial))
+        write_synced(partial / LOG, b"")
+        Journal(partial / LOG).append(first_event(partial))
         if directory.exists():
             directory.rmdir()
         os.replace(partial, directory)

@@ -1,20 +1,17 @@
 """The poses of a milling path on a robot, and what other feeds and turns would allow there."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import msgspec
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from planner.campaign.campaign import Campaign
-from planner.campaign.cut_source import StabilityRequest, ToolChange, at_poses
+from planner.campaign.cut_source import CampaignPoses, StabilityRequest, ToolChange
 from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.path import limit_at
-from planner.milling.structure import Structure
 from planner.milling.tool import frame_along
-from planner.milling.toolpath import is_toolpath, read_toolpath
+from planner.milling.toolpath import Toolpath, is_toolpath, read_toolpath
 from planner.progress import ProgressCallback, no_progress
 from planner.recording.folder import read_poses
 from planner.robot.collision import Collisions
@@ -27,121 +24,85 @@ MOST_POSES = 200
 STARTS = 4  # from which the first pose of a program is looked for, for each turn
 
 
-@dataclass(frozen=True)
-class PathRequest:
-    """--path, with --origin and --poses of a program, and whether turns are looked at."""
-
-    path: Path | None
-    origin: str | None = None
-    poses: int = 12
-    turns: bool = False
-
-    def check_none(self, source: Path) -> None:
-        """InputError where options ask for a robot that a file does not have."""
-        if self.path is not None or self.origin is not None or self.turns:
-            raise InputError(
-                f"{source} holds FRFs of certain poses; --path, --origin, --turns need a campaign."
-            )
-
-    @property
-    def origin_m(self) -> np.ndarray:
-        """(3,) of the program's zero in the robot's base frame."""
-        try:
-            found = np.array([float(part) for part in (self.origin or "").split(",")])
-        except ValueError:
-            found = np.zeros(0)
-        if len(found) != 3 or not np.all(np.abs(found) < 1e3):
-            raise InputError(
-                f"{self.path} is a program: say where its zero lies in the robot's base frame by "
-                f"--origin X,Y,Z in m, as 1.5,0,0.8."
-            )
-        return found
+def path_poses(asked: StabilityRequest, cut: Cut) -> CampaignPoses:
+    """Of a campaign; InputError where a pose cannot be reached, or the path is missing."""
+    path = asked.path
+    if path is None:
+        raise InputError(
+            f"{asked.source} is a campaign: name the path with --path, as a CSV of poses or a "
+            f"program (G-code, APT)."
+        )
+    change = ToolChange.of(asked, cut)
+    campaign = asked.campaign
+    cell = campaign.cell
+    if is_toolpath(path):
+        names, q, feeds = _program(cell.robot, asked, read_toolpath(path), cut)
+        return CampaignPoses(campaign, names, q, change, feeds)
+    if asked.origin is not None:
+        raise InputError(f"{path} holds joint angles; --origin goes with a program.")
+    rows = read_poses(path, cell.robot.joints)
+    q = [cell.check_pose(row.joints_deg, f"{path}, row {row.row}") for row in rows]
+    if not q:
+        raise InputError(f"{path} holds no pose; give one a row.")
+    return CampaignPoses(campaign, tuple(row.pose for row in rows), np.array(q), change)
 
 
-@dataclass(frozen=True, eq=False)
-class PathPoses:
-    """p named poses q (p, dof) of a campaign in rad, with feeds (p, 3) in the base if known."""
+def _origin_m(asked: StabilityRequest) -> np.ndarray:
+    """(3,) of a program's zero in the robot's base frame."""
+    try:
+        found = np.array([float(part) for part in (asked.origin or "").split(",")])
+    except ValueError:
+        found = np.zeros(0)
+    if len(found) != 3 or not np.all(np.abs(found) < 1e3):
+        raise InputError(
+            f"{asked.path} is a program: say where its zero lies in the robot's base frame by "
+            f"--origin X,Y,Z in m, as 1.5,0,0.8."
+        )
+    return found
 
-    campaign: Campaign
-    change: ToolChange | None
-    cut: Cut
-    names: tuple[str, ...]
-    q: np.ndarray
-    feeds: np.ndarray | None = None
 
-    @classmethod
-    def of(cls, asked: StabilityRequest, way: PathRequest, cut: Cut) -> "PathPoses":
-        """InputError where a pose cannot be reached, or the path is missing."""
-        if way.path is None:
-            raise InputError(
-                f"{asked.source} is a campaign: name the path with --path, as a CSV of poses or a "
-                f"program (G-code, APT)."
-            )
-        change = ToolChange.of(asked, cut)
-        campaign = asked.campaign
-        if is_toolpath(way.path):
-            names, q, feeds = _program(campaign.cell.robot, way, cut)
-            return cls(campaign, change, cut, names, q, feeds)
-        if way.origin is not None:
-            raise InputError(f"{way.path} holds joint angles; --origin goes with a program.")
-        cell = campaign.cell
-        rows = read_poses(way.path, cell.robot.joints)
-        q = [cell.check_pose(row.joints_deg, f"{way.path}, row {row.row}") for row in rows]
-        if not q:
-            raise InputError(f"{way.path} holds no pose; give one a row.")
-        return cls(campaign, change, cut, tuple(row.pose for row in rows), np.array(q))
+def _turned(robot: Robot, here: np.ndarray, axis: np.ndarray) -> list[tuple[float, np.ndarray]]:
+    """Angles in degrees, and q (dof,) turned by them about the tool, where the robot can stand.
 
-    def structures(self, cut: Cut) -> list[tuple[str, Structure]]:
-        """By name, in the order of the path."""
-        found = at_poses(self.campaign, self.names, self.q, cut, self.change, self.feeds)
-        return list(zip(self.names, found, strict=True))
+    From angle to angle it stays on its branch.
+    """
+    collisions, (rotation, position) = Collisions(robot), robot.forward(here)
+    found = {0.0: here}
+    for sense in (1.0, -1.0):
+        near = here
+        for turn in TURNS_DEG[1:]:
+            angle = float(sense * turn) % 360
+            if angle in found:
+                break
+            q = solve(robot, rotation @ about(axis, angle), position, near, collisions, 0).q
+            if q is None:
+                break
+            near = found[angle] = q
+    return list(found.items())
 
-    def turned(self, pose: int) -> list[tuple[float, np.ndarray]]:
-        """Angles in degrees, and q (dof,) turned by them about the tool, where the robot can stand.
 
-        From angle to angle it stays on its branch.
-        """
-        robot = self.campaign.cell.robot
-        collisions, here = Collisions(robot), self.q[pose]
-        (rotation, position), axis = robot.forward(here), np.array(self.cut.axis)
-        found = {0.0: here}
-        for sense in (1.0, -1.0):
-            near = here
-            for turn in TURNS_DEG[1:]:
-                angle = float(sense * turn) % 360
-                if angle in found:
-                    break
-                turned = rotation @ about(axis, angle)
-                q = solve(robot, turned, position, near, collisions, 0).q
-                if q is None:
-                    break
-                near = found[angle] = q
-        return list(found.items())
+def _feeds_in_base(at: CampaignPoses, cut: Cut) -> np.ndarray:
+    """Feeds (p, 3) in the base frame, as the cut or the path has them."""
+    rotation, position = at.campaign.cell.robot.forward_batch(at.q)
+    feed = np.array(cut.feed)
+    if cut.feed_in != "path":
+        return np.tile(feed, (len(rotation), 1)) if cut.feed_in == "base" else rotation @ feed
+    return np.gradient(position, axis=0) if at.feeds is None else at.feeds
 
-    @property
-    def in_base(self) -> np.ndarray:
-        """Feeds (p, 3) in the base frame, as the cut or the path has them."""
-        rotation, position = self.campaign.cell.robot.forward_batch(self.q)
-        feed = np.array(self.cut.feed)
-        if self.cut.feed_in != "path":
-            return (
-                np.tile(feed, (len(rotation), 1)) if self.cut.feed_in == "base" else rotation @ feed
-            )
-        return np.gradient(position, axis=0) if self.feeds is None else self.feeds
 
-    def feed_in_base(self, turn_deg: float) -> tuple[float, float, float] | None:
-        """The feed turned about the tool's axis, in the base frame; None if poses differ in it."""
-        rotation, _ = self.campaign.cell.robot.forward_batch(self.q)
-        axis = rotation @ (np.array(self.cut.axis) / np.linalg.norm(self.cut.axis))
-        feed = self.in_base
-        feed = feed - axis * np.sum(feed * axis, axis=1, keepdims=True)
-        feed /= np.linalg.norm(feed, axis=1, keepdims=True)
-        turn = np.deg2rad(turn_deg)
-        turned = np.cos(turn) * feed + np.sin(turn) * np.cross(axis, feed)
-        if np.max(np.linalg.norm(turned - turned[0], axis=1)) > SAME:
-            return None
-        x, y, z = (float(v) for v in turned[0])
-        return x, y, z
+def feed_in_base(at: CampaignPoses, cut: Cut, turn_deg: float) -> tuple[float, float, float] | None:
+    """The feed turned about the tool's axis, in the base frame; None if poses differ in it."""
+    rotation, _ = at.campaign.cell.robot.forward_batch(at.q)
+    axis = rotation @ (np.array(cut.axis) / np.linalg.norm(cut.axis))
+    feed = _feeds_in_base(at, cut)
+    feed = feed - axis * np.sum(feed * axis, axis=1, keepdims=True)
+    feed /= np.linalg.norm(feed, axis=1, keepdims=True)
+    turn = np.deg2rad(turn_deg)
+    turned = np.cos(turn) * feed + np.sin(turn) * np.cross(axis, feed)
+    if np.max(np.linalg.norm(turned - turned[0], axis=1)) > SAME:
+        return None
+    x, y, z = (float(v) for v in turned[0])
+    return x, y, z
 
 
 SAME = 0.02  # by which unit vectors that are the same may differ
@@ -154,15 +115,13 @@ def about(axis: np.ndarray, turn_deg: float) -> np.ndarray:
 
 
 def _program(
-    robot: Robot, way: PathRequest, cut: Cut
+    robot: Robot, asked: StabilityRequest, path: Toolpath, cut: Cut
 ) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
     """Names, angles (p, dof) and feeds (p, 3): the first turn at which all can be reached."""
-    assert way.path is not None
-    path = read_toolpath(way.path)
-    if not 2 <= way.poses <= MOST_POSES:
-        raise InputError(f"--poses {way.poses}: give 2 to {MOST_POSES}.")
-    position, feeds, names = path.points(way.poses)
-    position = position + way.origin_m
+    if not 2 <= asked.poses <= MOST_POSES:
+        raise InputError(f"--poses {asked.poses}: give 2 to {MOST_POSES}.")
+    position, feeds, names = path.points(asked.poses)
+    position = position + _origin_m(asked)
     collisions, reasons = Collisions(robot), []
     for turn in TURNS_DEG:
         rotation = _upright(np.array(cut.axis), path.spindle, float(turn))
@@ -173,8 +132,8 @@ def _program(
             reasons.append(reason)
     at, reason = max(reasons, key=lambda one: one[0])
     raise InputError(
-        f"{way.path}: {names[at]} cannot be reached at any turn about the tool's axis ({reason}); "
-        f"check --origin and the axis in the cut's file."
+        f"{asked.path}: {names[at]} cannot be reached at any turn about the tool's axis "
+        f"({reason}); check --origin and the axis in the cut's file."
     )
 
 
@@ -275,17 +234,18 @@ class TurnAdvice:
 
 
 def turn_advice(
-    travelled: PathPoses, cut: Cut, rpm: float, progress: ProgressCallback = no_progress
+    at: CampaignPoses, cut: Cut, rpm: float, progress: ProgressCallback = no_progress
 ) -> TurnAdvice:
     """At a speed in rpm, of each pose and angle."""
-    found = [(i, turn, q) for i in range(len(travelled.q)) for turn, q in travelled.turned(i)]
+    robot, axis = at.campaign.cell.robot, np.array(cut.axis)
+    found = [(i, *one) for i, here in enumerate(at.q) for one in _turned(robot, here, axis)]
     turned = replace(
-        travelled,
-        names=tuple(f"{travelled.names[i]}, turned {turn:g}°" for i, turn, _ in found),
+        at,
+        names=tuple(f"{at.names[i]}, turned {turn:g}°" for i, turn, _ in found),
         q=np.array([q for _, _, q in found]),
-        feeds=travelled.in_base[[i for i, _, _ in found]],
+        feeds=_feeds_in_base(at, cut)[[i for i, _, _ in found]],
     )
-    depth = np.full((len(travelled.q), len(TURNS_DEG)), np.nan)
+    depth = np.full((len(at.q), len(TURNS_DEG)), np.nan)
     # With the feeds as they are in the base frame, whatever the cut says.
     poses = turned.structures(msgspec.structs.replace(cut, feed_in="path"))
     for k, ((i, turn, _), (_, structure)) in enumerate(zip(found, poses, strict=True)):

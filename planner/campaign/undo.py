@@ -5,24 +5,15 @@ from itertools import takewhile
 
 import msgspec
 
-from planner.campaign.events import (
-    Configured,
-    Confirmed,
-    Entry,
-    FilesPlaced,
-    FilesShown,
-    Imported,
-    Proposed,
-    Refused,
-    Skipped,
-    Starred,
-    Undone,
-    Withdrawn,
-)
+from planner.campaign import events
+from planner.campaign.events import Entry
 from planner.campaign.state import fold, taken_back
 from planner.words import counted, listed
 
-ACTS = (Proposed, Imported, Confirmed, Refused, Withdrawn, Skipped, FilesPlaced, Starred)
+ACTS = (
+    events.Proposed, events.Imported, events.Confirmed, events.Refused, events.Withdrawn,
+    events.Skipped, events.FilesPlaced, events.Starred,
+)  # fmt: skip
 
 
 def last_acts(entries: Sequence[Entry], decisions_only: bool = False) -> tuple[Entry, ...]:
@@ -35,7 +26,7 @@ def last_acts(entries: Sequence[Entry], decisions_only: bool = False) -> tuple[E
     acts = [e for e in entries if isinstance(e.event, ACTS) and e.seq not in undone]
     if not decisions_only:
         return tuple(acts[-1:])
-    proposals = [*takewhile(lambda e: isinstance(e.event, Proposed), reversed(acts))][::-1]
+    proposals = [*takewhile(lambda e: isinstance(e.event, events.Proposed), reversed(acts))][::-1]
     if len(proposals) == len(acts):
         return ()
     decision = acts[-1 - len(proposals)]
@@ -53,13 +44,13 @@ def last_undone(entries: Sequence[Entry]) -> tuple[Entry | None, tuple[Entry, ..
     since: list[Entry] = []
     for entry in reversed(entries):
         event = entry.event
-        if entry.seq in undone or not isinstance(event, (*ACTS, Undone)):
+        if entry.seq in undone or not isinstance(event, (*ACTS, events.Undone)):
             continue
-        if isinstance(event, Proposed):
+        if isinstance(event, events.Proposed):
             since.append(entry)
-        elif not isinstance(event, Undone):
+        elif not isinstance(event, events.Undone):
             break
-        elif not any(isinstance(entries[act - 1].event, Undone) for act in event.acts):
+        elif not any(isinstance(entries[act - 1].event, events.Undone) for act in event.acts):
             return entry, tuple(since)
     return None, ()
 
@@ -75,12 +66,12 @@ def in_short(entry: Entry | None) -> str:
 def in_words(entry: Entry) -> str:
     """What an entry of the log says, in words."""
     event = entry.event
-    if isinstance(event, Configured):
+    if isinstance(event, events.Configured):
         return f"configured, with planner {event.planner}"
-    if isinstance(event, Proposed):
+    if isinstance(event, events.Proposed):
         poses = ", ".join(p.pose for p in event.proposals)
         return f"proposed {poses} by {event.acquisition}"
-    if isinstance(event, Imported):
+    if isinstance(event, events.Imported):
         used = sum(hit.accepted for hit in event.hits)
         if event.unhit:
             return f"refused all of {counted(len(event.hits), 'hit')} at {event.pose}"
@@ -88,13 +79,13 @@ def in_words(entry: Entry) -> str:
         if event.question:
             return f"held {hits} at {event.pose} until a question is answered"
         return f"imported {used} of {hits} at {event.pose}"
-    if isinstance(event, Refused):
+    if isinstance(event, events.Refused):
         return f"refused {counted(len(event.hits), 'hit')} at {event.pose}"
-    if isinstance(event, Undone):
+    if isinstance(event, events.Undone):
         which = "entry" if len(event.acts) == 1 else "entries"
         return f"took back {which} {listed([str(act) for act in event.acts])}"
-    if isinstance(event, FilesShown | FilesPlaced):
-        if isinstance(event, FilesPlaced):
+    if isinstance(event, events.FilesShown | events.FilesPlaced):
+        if isinstance(event, events.FilesPlaced):
             return f"{counted(len(event.files), 'late file')} taken as {event.pose}'s"
         like = f", like those of {event.pose}" if event.at else ""
         return f"{counted(len(event.files), 'file')} shown at {event.at or event.pose}{like}"

@@ -73,8 +73,10 @@ def stability(
     from planner.milling.cut import load_cut
     from planner.report.pictures import Pictures
 
-    coupled = tool, reference, robot, noise / 100
-    asked = StabilityRequest(source, cut, pose, point, samples, *coupled, from_names, peak_force_n)
+    coupled, way = (tool, reference, robot, noise / 100), (path, origin, poses or 12, turns)
+    asked = StabilityRequest(
+        source, cut, pose, point, samples, *coupled, from_names, peak_force_n, *way
+    )
     pictures = Pictures(plot, format_, rrd)
     check(path, origin, turns, poses, map_, pose)
     with progress_bar("computing", quiet=as_json) as progress:
@@ -85,11 +87,9 @@ def stability(
                 map_report(asked, poses or 40, load_cut(cut), pictures, progress), as_json
             )
         if path is not None or pose == "all":
-            from planner.campaign.toolpath_poses import PathRequest
             from planner.report.stability import path_report
 
-            way = PathRequest(path, origin, poses or 12, turns)
-            return respond(path_report(asked, way, load_cut(cut), pictures, progress), as_json)
+            return respond(path_report(asked, load_cut(cut), pictures, progress), as_json)
         from planner.report.stability import stability_of
 
         return respond(stability_of(asked, pictures, progress), as_json)

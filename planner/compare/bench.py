@@ -73,9 +73,7 @@ class Bench:
 def cell_of(bench: Bench) -> PoolCell:
     """The bench's cell, made once in each process; it is not safe to share among threads."""
     loaded = Cell.load(bench.robot.path, bench.config, bench.robot)
-    return PoolCell(
-        loaded.config, loaded.robot, loaded.simulation, loaded.workspace, bench.q, cut=loaded.cut
-    )
+    return PoolCell(loaded.config, loaded.robot, loaded.simulation, loaded.workspace, bench.q)
 
 
 def comparison_config(

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from planner.campaign import cut_source, toolpath_poses
+from planner.errors import InputError
 from planner.milling import lobes
 from planner.milling.cut import Cut, load_cut
 from planner.milling.machine import multiplier
@@ -131,30 +132,34 @@ def _table(
 
 
 def path_report(
-    asked: cut_source.StabilityRequest,
-    way: toolpath_poses.PathRequest,
-    cut: Cut,
-    pictures: Pictures,
-    progress: ProgressCallback,
+    asked: cut_source.StabilityRequest, cut: Cut, pictures: Pictures, progress: ProgressCallback
 ) -> Done:
-    """Answer of `stability` of every pose of an npz, or of a campaign along a way.
+    """Answer of `stability` of every pose of an npz, or of a campaign along a path.
 
     "tightest_pose" is per speed (n,) the one that allows the least, "best_depth_m_at_95" what the
     whole path allows at "best_spindle_rpm".
     """
-    travelled = toolpath_poses.PathPoses.of(asked, way, cut) if asked.source.is_dir() else None
-    if travelled is None:
-        way.check_none(asked.source)
+    travelled = toolpath_poses.path_poses(asked, cut) if asked.source.is_dir() else None
+    if travelled is None and (asked.path or asked.origin or asked.turns):
+        raise InputError(
+            f"{asked.source} holds FRFs of certain poses; --path, --origin, --turns need a "
+            f"campaign."
+        )
     poses = travelled.structures(cut) if travelled else cut_source.structures_of_file(asked, cut)
-    limits = limits_along(poses, cut, asked.samples, part_of(progress, 0, 0.5 if way.turns else 1))
+    limits = limits_along(
+        poses, cut, asked.samples, part_of(progress, 0, 0.5 if asked.turns else 1)
+    )
     robust, at = np.min(limits.robust_m, axis=0), limits.best_speed
     rpm, depth, turn = float(cut.speeds_rpm[at]), float(robust[at]), None
     turned = limits_by_feed(poses, cut, rpm)
     feed = toolpath_poses.FeedAdvice(tuple(map(float, TURNS_DEG)), tuple(map(float, turned)))
     if travelled is not None:
-        if way.turns:
+        if asked.turns:
             turn = toolpath_poses.turn_advice(travelled, cut, rpm, part_of(progress, 0.5, 1.0))
-        feed = replace(feed, direction_base=travelled.feed_in_base(feed.turn_deg[feed.best]))
+        feed = replace(
+            feed,
+            direction_base=toolpath_poses.feed_in_base(travelled, cut, feed.turn_deg[feed.best]),
+        )
     simulated = any(one.frf is not None and one.frf.simulated for _, one in poses)
     tightest = [limits.names[i] for i in limits.tightest]
     more = {
@@ -165,8 +170,7 @@ def path_report(
             simulated=simulated,
         ),
     }  # fmt: skip
-    first = np.argmin(limits.depth_m, axis=0)
-    losses = [limits.found[p][i] for i, p in enumerate(first)]
+    losses = [limits.found[p][i] for i, p in enumerate(np.argmin(limits.depth_m, axis=0))]
     known = zip(tightest, losses, strict=True)
     cells = [pose if np.isfinite(loss.depth_m) else "–" for pose, loss in known]
     made = _table(cut, losses, robust, f"{len(poses)} poses", "tightest pose", cells)
@@ -194,13 +198,12 @@ def _path_figures(
 
 def _of_poses(
     poses: Sequence[tuple[str, Structure]], limits: PathLimits, cut: Cut,
-    travelled: toolpath_poses.PathPoses | None,
+    travelled: cut_source.CampaignPoses | None,
 ) -> list[str]:  # fmt: skip
-    """What to mind of a campaign's way, and of each pose."""
+    """What to mind of a campaign's path, and of each pose."""
     told: list[str] = []
     if travelled is not None:
-        told += cut_source.outside(travelled.campaign, travelled.names, travelled.q)
-        told += cut_source.beyond_the_tip(travelled.campaign, cut)
+        told += travelled.remarks(cut)
     told += [
         f"{name}: {text}" for (name, structure), row in zip(poses, limits.found, strict=True)
         if (text := out_of_band_remark(structure, np.array([loss.chatter_hz for loss in row])))

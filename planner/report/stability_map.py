@@ -87,7 +87,7 @@ def _in_band(
     change, campaign = cut_source.ToolChange.of(asked, cut), asked.campaign
     count = min(count, campaign.cell.spread)
     names, q = tuple(f"W{i + 1:03d}" for i in range(count)), campaign.cell.candidates.q[:count]
-    at = list(cut_source.at_poses_in_band(campaign, names, q, cut, change))
+    at = list(cut_source.CampaignPoses(campaign, names, q, change).in_band(cut))
     kept = [i for i, s in enumerate(at) if isinstance(s, Structure)]
     if not kept:
         raise next(s for s in at if isinstance(s, OutOfBandError))

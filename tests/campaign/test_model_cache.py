@@ -164,9 +164,8 @@ def test_status_of_a_kept_model_needs_no_heavy_library(folder):
 @pytest.fixture(scope="module")
 def one(tmp_path_factory):
     """A campaign of one pose."""
-    campaign = shipped_campaign(tmp_path_factory.mktemp("one"), FROZEN)
-    campaign.import_paths((RECORDINGS,), "A11")
-    return campaign.directory
+    parent = tmp_path_factory.mktemp("one")
+    return measured(parent, POSES[:1], Store(None), FROZEN).directory
 
 
 @pytest.fixture
