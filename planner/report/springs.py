@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from planner.fit.departures import RefittedMass, known_masses
 from planner.words import with_sd
 
 if TYPE_CHECKING:
@@ -84,6 +83,23 @@ class RefittedSpring:
         )
 
 
+@dataclass(frozen=True)
+class RefittedLink:
+    """The mass of a link with what is mounted on it, as stated and as refitted, with sds."""
+
+    link: str
+    stated_kg: float
+    stated_sd_kg: float
+    mass_kg: float
+    mass_sd_kg: float
+
+    @property
+    def cells(self) -> tuple[str, str, str]:
+        """A row of the table."""
+        stated = with_sd(self.stated_kg, self.stated_sd_kg)
+        return self.link, stated, with_sd(self.mass_kg, self.mass_sd_kg)
+
+
 def refitted_springs(model: "Model") -> tuple[RefittedSpring, ...]:
     """One entry for each spring that was fitted; none where the simulation does not learn."""
     fit = model.low.identified_robot
@@ -105,16 +121,16 @@ def refitted_springs(model: "Model") -> tuple[RefittedSpring, ...]:
     )  # fmt: skip
 
 
-def refitted_masses(model: "Model") -> tuple[RefittedMass, ...]:
+def refitted_masses(model: "Model") -> tuple[RefittedLink, ...]:
     """Of links whose masses the recordings tell; none where the simulation does not learn."""
+    from planner.fit.departures import known_masses  # status needs none of what it imports
+
     fit = model.low.identified_robot
-    return tuple(known_masses(fit.posterior)) if fit else ()
-
-
-def mass_cells(mass: RefittedMass) -> tuple[str, str, str]:
-    """A row of the table."""
-    stated = with_sd(mass.stated_kg, mass.sd_kg)
-    return mass.link, stated, with_sd(mass.stated_kg + mass.more_kg, mass.left_kg)
+    known = known_masses(fit.posterior) if fit else []
+    return tuple(
+        RefittedLink(m.link, m.stated_kg, m.sd_kg, m.stated_kg + m.more_kg, m.left_kg)
+        for m in known
+    )
 
 
 def identified_springs(robot: "Robot", found: "Identification") -> tuple[IdentifiedSpring, ...]:

@@ -15,7 +15,6 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.model_status import DecisionStatus, LeftOutValues, found_without, left_out
 from planner.campaign.state import Measurement
 from planner.design.stopping import Forecast
-from planner.fit.departures import RefittedMass
 from planner.report.answer import Done
 from planner.report.imports import asked_of
 from planner.report.pictures import Pictures
@@ -25,8 +24,8 @@ from planner.report.springs import (
     COLUMNS,
     MASS_COLUMNS,
     NOT_KNOWN,
+    RefittedLink,
     RefittedSpring,
-    mass_cells,
     refitted_masses,
     refitted_springs,
 )
@@ -56,7 +55,7 @@ class ModelStatus:
     decision: DecisionStatus | None = None  # where the campaign is for a cut
     joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
     springs: tuple[RefittedSpring, ...] = ()  # none where the simulation does not learn
-    masses: tuple[RefittedMass, ...] = ()  # of links, where the recordings tell them
+    masses: tuple[RefittedLink, ...] = ()  # of links, where the recordings tell them
     waits_for: str = ""  # what lacks until the target is reached
     frf_sd_percent: tuple[float, ...] = ()  # of predicted FRFs, and of their common scale
     not_predicted: str = ""  # modes that every pose shows beside those predicted
@@ -140,7 +139,7 @@ def _tables(keys: Mapping[str, Any]) -> list[RenderableType]:
         parts += [table(title, *COLUMNS, rows=each), Text(f"  {NOT_KNOWN}")]
     if keys["masses"]:
         title = "Masses that the recordings tell, of each link with what is mounted on it"
-        parts.append(table(title, *MASS_COLUMNS, rows=map(mass_cells, keys["masses"])))
+        parts.append(table(title, *MASS_COLUMNS, rows=(mass.cells for mass in keys["masses"])))
     return parts + ([] if keys["models"] is msgspec.UNSET else models_text(keys["models"]))
 
 
