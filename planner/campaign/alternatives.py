@@ -28,7 +28,7 @@ FAR_OFF_HITS = (
     "hits look struck far beside the tool's tip, or slanted: was it that point, and along its axes?"
 )
 OTHER_TOOL = (
-    "what the last joint carries looks another than at the poses before: was the tool changed (a "
+    "the load on the last joint differs from that at the poses before: was the tool changed (a "
     "campaign is of one tool), or does something hang on it?"
 )
 FOLLOWED = 3  # mistakes that are fitted beside rivals, those that seem likeliest at once

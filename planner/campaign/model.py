@@ -285,8 +285,8 @@ class Model:
             return ""
         hz, count = [f for own in others for f in own], self.cell.config.modes.count
         return (
-            f"That is said of {counted(count, 'mode')}: every pose shows others that are not "
-            f"predicted (between {min(hz):.1f} and {max(hz):.1f} Hz). Where they matter, raise "
+            f"This holds for {counted(count, 'mode')}; every pose shows more, which are not "
+            f"counted (between {min(hz):.1f} and {max(hz):.1f} Hz). Where they matter, raise "
             f"count in [modes] of campaign.toml."
         )
 

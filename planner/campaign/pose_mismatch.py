@@ -152,7 +152,7 @@ def _asked(pose: str, off_percent: float, fits: Alternative | None) -> Question:
     if fits is not None and fits.about == "chain":
         text = f"At {pose}, {fits.what} Are these hits right as they are?"
     elif fits is not None and fits.about == "readback":
-        text = f"These hits {fits.what} Are the angles right as stated?"
+        text = f"These hits {fits.what} Are the stated angles right?"
     elif fits is not None and fits.about == "earlier":
         again = fits.pose == pose
         those = f"those of {fits.pose}" + (" before" if again else "")

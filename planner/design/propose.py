@@ -69,12 +69,12 @@ class Travel:
 # In words, for who chooses one.
 DESCRIPTIONS = {
     "variance": "the pose whose frequencies are least sure",
-    "integrated_variance": "the pose that makes all of the workspace surest",
+    "integrated_variance": "the pose that lowers the variance over the whole workspace most",
     "mutual_information": "the pose that tells most of all the others",
-    "parameter_information": "the pose that makes predictions surest by what parameters leave open",
+    "parameter_information": "the pose that lowers most what the simulation's parameters leave open of predictions",
     "d_information": "the pose that tells most of the simulation's parameters themselves",
-    "mixed": "the pose that makes the workspace surest by frequencies and parameters together",
-    "goal": "the pose that makes those of [goal] surest",
+    "mixed": "the pose that lowers the workspace's variance most, of frequencies and parameters together",
+    "goal": "the pose that lowers the variance at those of [goal] most",
     "stability": "the pose that tells most of whether the cut of [cut] is stable",
     "random": "poses at random, without looking at the model",
     "sobol": "poses spread evenly by a Sobol sequence, without looking at the model",
