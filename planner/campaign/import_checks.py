@@ -84,7 +84,7 @@ def _far_from_setpoint(claim: Claim) -> Question | None:
     away = np.abs(np.subtract(claim.setpoint_deg, claim.joints_deg)) / claim.joints.same()
     if np.max(away) < FAR:
         return None
-    return Question(f"{claim.displacement} Is the stated one right?", about="readback")
+    return Question(f"{claim.displacement} Is the readback right?", about="readback")
 
 
 def _unstated_window(claim: Claim, measured: MeasuredPose) -> Question | None:
