@@ -69,9 +69,9 @@ class Travel:
 # In words, for who chooses one.
 DESCRIPTIONS = {
     "variance": "the pose whose frequencies are least sure",
-    "integrated_variance": "the pose that lowers the variance over the whole workspace most",
+    "integrated_variance": "the pose that lowers most the variance over the workspace",
     "mutual_information": "the pose that tells most of all the others",
-    "parameter_information": "the pose that lowers most the variance by the simulation's parameters",
+    "parameter_information": "the pose that lowers most what parameters leave open",
     "d_information": "the pose that tells most of the simulation's parameters themselves",
     "mixed": "the pose that lowers most the variance by frequencies and parameters",
     "goal": "the pose that lowers the variance at those of [goal] most",
