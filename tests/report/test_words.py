@@ -108,11 +108,11 @@ class Said:
     ("verdict", "ranked", "words"),
     [
         ("unexplained", ((UNKNOWN, 0.92), (BASE, 0.08)),
-         ("None of the effects that planner knows explains", "(probability 92 %)", "99.99 %",
-          "base compliance at base and transverse compliance at joint_1:")),
+         ("No effects that planner knows explain", "(probability 92 %)", "99.99 %",
+          "base compliance at base and transverse compliance at joint_1; with them")),
         ("unexplained", ((UNKNOWN, 1.0), ((("none", None),), 0.0)),
          ("none of the effects that planner knows describes it",)),
-        ("explained", ((BASE, 1.0),), ("explains",)),
+        ("explained", ((BASE, 1.0),), ("with this it does:",)),
     ],
 )  # fmt: skip
 def test_a_verdict_names_what_comes_nearest(verdict, ranked, words):
