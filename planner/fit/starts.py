@@ -36,7 +36,7 @@ def in_place_of(base: StructureFit, structure: RobotStructure) -> list[np.ndarra
 
 def _carried_by(structure: RobotStructure, x: np.ndarray) -> list[np.ndarray]:
     """x with what the last effect's body has beside what is stated in that effect, as far as such a
-    mass can be; FRFs are the same."""
+    mass can be: FRFs are the same, where what is left of it is as likely as what is stated."""
     effect, own, bodies = structure.effects[-1], structure.own[-1], structure.bodies
     carried = effect.inertia(x[own])
     if carried is None:
@@ -48,7 +48,8 @@ def _carried_by(structure: RobotStructure, x: np.ndarray) -> list[np.ndarray]:
     if psi is None or there is None:
         return []
     out[own], mine, left = psi, bodies.mine[body], strayed - there[1]
-    out[structure.inertial][mine] = np.linalg.lstsq(bodies.change[body, mine].T, left)[0]
+    numbers = np.linalg.lstsq(bodies.change[body, mine].T, left)[0]
+    out[structure.inertial][mine] = np.clip(numbers, -1, 1)
     return [out]
 
 
