@@ -27,7 +27,7 @@ from tests.support.rerun_columns import entities_of
 SIX = ("+x", "+x", "+y", "+y", "+z", "+z")
 WANTED = (
     "joint_a1", "angle (°)", "expected (Hz)", "damping (%)", "tool at x", "measured (Hz)",
-    "off by (sd)", "sd of frequencies", "target 1 %", "min per pose", "SIMULATED",
+    "off by (sd)", "sd of predicted frequencies", "target 1 %", "min per pose", "SIMULATED",
 )  # fmt: skip
 
 
