@@ -167,12 +167,14 @@ class LowFidelity:
             f"Fitted to the recordings, the simulation still differs from them by "
             f"{self.misfit_sds:.2g} times their noise: it lacks physics"
         )
+        if fit.poses > 1:
+            text += ", or files or angles of a pose are not its own"
         if self.identified_robot is None:
             how = "the campaign goes on without it"
             if self.nominal is not None:
                 how = "the campaign uses it unfitted, with the values of robot.toml"
             return f"{text}; {how}."
-        return f"{text}, or its geometry is off."
+        return f"{text}; or its geometry is off."
 
     @property
     def belief(self) -> float:

@@ -78,6 +78,7 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
         return None if answered else chain_mismatch(claim, measured.frf)
     if _other_before(claim, fit, frf, fits):
         return None  # the import tells of that pose
+    fits = fits or _elsewhere_before(claim, fit, frf)
     return _asked(claim.pose, 100 * expected.off(q, frf), fits)
 
 
@@ -142,6 +143,25 @@ def _other_before(claim: Claim, fit: IdentifiedRobot, frf: Frf, fits: Alternativ
     return explains_all(found) and here == 1.0 < max(before)
 
 
+def _elsewhere_before(claim: Claim, fit: IdentifiedRobot, frf: Frf) -> Alternative | None:
+    """A pose before without whose hits all others agree: they may be of any other pose."""
+    if not SURE <= fit.poses <= PLACED or frf.layout.sensors != TOOL.sensors:
+        return None
+    known, used = fit.posterior, claim.model.used
+    q = np.array([*(claim.joints.internal(m.joints_deg) for m in used), claim.q])
+    frfs = (*claim.model.frfs, frf)
+    for k, m in reversed([*enumerate(used)]):
+        others = [i for i in range(len(q)) if i != k]
+        search = Search(
+            known.structure.prior, tuple(frfs[i] for i in others), q[others], claim.band_hz,
+            known.tolerances,
+        )  # fmt: skip
+        if explains_all(search.found()):
+            what = "look as if of another pose: without them all others agree."
+            return Alternative(q[k], what, m.pose, about="earlier")
+    return None
+
+
 def _called_right(state: CampaignState) -> tuple[str, ...]:
     """What the engineer was asked of the chain before, where the hits were used then."""
     asked = (m.question for m in state.measurements.values() if m.question is not None)
@@ -156,7 +176,7 @@ def _asked(pose: str, off_percent: float, fits: Alternative | None) -> Question:
     elif fits is not None and fits.about == "earlier":
         again = fits.pose == pose
         those = f"those of {fits.pose}" + (" before" if again else "")
-        whose = "the angles stated then" if again else "its angles"
+        whose = "the files and angles given then" if again else "its files and angles"
         text = (
             f"These hits contradict {those}, and {those} {fits.what} Are {whose} right as they are?"
         )

@@ -220,8 +220,8 @@ def how_to_answer(directory: Path | str, pose: str, asked: Question) -> str:
             own = command("planner", "import", directory, "FOLDER", "--pose", f"{pose}c")
             also = f"then import the new ones as one of their own ({own})"
         return (
-            f"{asked.text} The new hits of {pose} are held, not used. Where the angles of "
-            f"{before} are wrong: {ask}, correct them in recordings.csv, import its files "
+            f"{asked.text} The new hits of {pose} are held, not used. Where files or angles of "
+            f"{before} are wrong: {ask}, correct them, import its files "
             f"once more as another pose ({again}), {also}; if they are right, and those of "
             f"{'the new hits' if asked.fits == pose else pose} are wrong: {withdraw}."
         )

@@ -1,6 +1,7 @@
 """Hits of another pose, with a wrong angle, by another chain or tool, after few measurements.
 
-How often it is asked after more, and of what else: test_pose_mismatch_rates.py.
+How often it is asked after more, and of what else: test_pose_mismatch_rates.py. Files of another
+pose before: `pytest -m slow tests/campaign/test_wrong_pose.py`.
 """
 
 import csv
@@ -131,6 +132,19 @@ def test_another_tool_is_asked_about_and_the_same_one_is_not(case):
     ]
     assert asked[0] is None
     assert OTHER_TOOL in asked[1].text
+
+
+@pytest.mark.slow
+def test_an_early_pose_whose_files_are_of_another_is_asked_about(case):
+    """The hits of a pose that is never listed were given for the second one."""
+    changed = list(case.measured)
+    changed[1] = case.measured[-1]
+    campaign = CaseCampaign.of(replace(case, measured=tuple(changed)))
+    state = campaign.state(2, unlisted=[2])
+    claim = Claim(campaign.model(state), state, "X", campaign.angles(case.q[2]))
+    asked = question_about(claim, MeasuredPose((), case.band_hz, given=case.measured[2].hits))
+    assert (asked.about, asked.fits) == ("earlier", "P1")
+    assert "without them all others agree. Are its files and angles right" in asked.text
 
 
 def louder(pose: MeasuredPose) -> MeasuredPose:
