@@ -126,39 +126,39 @@ def _earlier(claim: Claim, found: RobotPosterior, frf: Frf) -> Alternative | Non
     return replace(wrong[1], pose=every[wrong[0]].pose, about="earlier") if wrong else None
 
 
+def _few_together(claim: Claim, fit: IdentifiedRobot, frf: Frf) -> Search | None:
+    """A search over all hits, the new ones last, where few poses were measured; else None."""
+    if not SURE <= fit.poses <= PLACED or frf.layout.sensors != TOOL.sensors:
+        return None
+    q = np.array([*(claim.joints.internal(m.joints_deg) for m in claim.model.used), claim.q])
+    known, frfs = fit.posterior, (*claim.model.frfs, frf)
+    return Search(known.structure.prior, frfs, q, claim.band_hz, known.tolerances)
+
+
 def _other_before(claim: Claim, fit: IdentifiedRobot, frf: Frf, fits: Alternative | None) -> bool:
     """Whether a pose before, not this one, was measured by another chain than the others.
 
     It has bent what is expected, where few poses were measured; all together tell whose it was.
     """
-    few = SURE <= fit.poses <= PLACED and frf.layout.sensors == TOOL.sensors
-    of_chain, known = fits is None or fits.about == "chain", fit.posterior
-    if not (few and of_chain and strained(known.found)):
+    search, known = _few_together(claim, fit, frf), fit.posterior.found
+    if search is None or not (fits is None or fits.about == "chain") or not strained(known):
         return False
-    q = [claim.joints.internal(m.joints_deg) for m in claim.model.used]
-    q, frfs = np.array([*q, claim.q]), (*claim.model.frfs, frf)
-    search = Search(known.structure.prior, frfs, q, claim.band_hz, known.tolerances)
-    found = search.found(known.found.remembered)
+    found = search.found(known.remembered)
     *before, here = np.atleast_1d(found.misfit.data.multiples)
     return explains_all(found) and here == 1.0 < max(before)
 
 
 def _elsewhere_before(claim: Claim, fit: IdentifiedRobot, frf: Frf) -> Alternative | None:
     """A pose before without whose hits all others agree: they may be of any other pose."""
-    if not SURE <= fit.poses <= PLACED or frf.layout.sensors != TOOL.sensors:
+    every = _few_together(claim, fit, frf)
+    if every is None:
         return None
-    known, used = fit.posterior, claim.model.used
-    q = np.array([*(claim.joints.internal(m.joints_deg) for m in used), claim.q])
-    frfs = (*claim.model.frfs, frf)
-    for k, m in reversed([*enumerate(used)]):
-        others = [i for i in range(len(q)) if i != k]
-        search = Search(
-            known.structure.prior, tuple(frfs[i] for i in others), q[others], claim.band_hz,
-            known.tolerances,
-        )  # fmt: skip
-        if explains_all(search.found()):
+    for k, m in reversed([*enumerate(claim.model.used)]):
+        others = [i for i in range(len(every.q)) if i != k]
+        frfs = tuple(every.frfs[i] for i in others)
+        if explains_all(replace(every, frfs=frfs, q=every.q[others]).found()):
             what = "look as if of another pose: without them all others agree."
-            return Alternative(q[k], what, m.pose, about="earlier")
+            return Alternative(every.q[k], what, m.pose, about="earlier")
     return None
 
 

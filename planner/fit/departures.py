@@ -1,7 +1,7 @@
 """Springs and bodies that a fit moved far from what robot.toml states: something is missing."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -56,16 +56,12 @@ def _springs(s: RobotStructure, x: np.ndarray, far: tuple[int, ...]) -> Iterator
 
 @dataclass(frozen=True)
 class RefittedMass:
-    """A link with what is mounted on it: kg as stated, how many more by a fit, and their sd.
-
-    `left_kg` is the sd that the recordings leave of them, where it was asked for.
-    """
+    """A link with what is mounted on it: kg as stated, how many more by a fit, and their sd."""
 
     link: str
     stated_kg: float
     more_kg: float
     sd_kg: float
-    left_kg: float = float("nan")
 
     @property
     def text(self) -> str:
@@ -86,8 +82,8 @@ def refitted_masses(s: RobotStructure, x: np.ndarray) -> list[RefittedMass]:
     return found
 
 
-def known_masses(belief: RobotBelief) -> list[RefittedMass]:
-    """Those whose sd the recordings halve, or more."""
+def known_masses(belief: RobotBelief) -> list[tuple[RefittedMass, float]]:
+    """Those whose sd the recordings halve, or more, and what they leave of it in kg."""
     s, numbers = belief.structure, belief.structure.inertial
     bodies, links, slopes = s.bodies, np.array(_links(s)), s.bodies.slopes(belief.x[numbers])
     told = []
@@ -97,7 +93,7 @@ def known_masses(belief: RobotBelief) -> list[RefittedMass]:
             by_number[bodies.mine[k]] += slopes[k][:, 0]
         left = float(np.sqrt(by_number @ belief.covariance[numbers, numbers] @ by_number))
         if left < HALVED * mass.sd_kg:
-            told.append(replace(mass, left_kg=left))
+            told.append((mass, left))
     return told
 
 

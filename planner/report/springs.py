@@ -128,8 +128,8 @@ def refitted_masses(model: "Model") -> tuple[RefittedLink, ...]:
     fit = model.low.identified_robot
     known = known_masses(fit.posterior) if fit else []
     return tuple(
-        RefittedLink(m.link, m.stated_kg, m.sd_kg, m.stated_kg + m.more_kg, m.left_kg)
-        for m in known
+        RefittedLink(m.link, m.stated_kg, m.sd_kg, m.stated_kg + m.more_kg, left_kg)
+        for m, left_kg in known
     )
 
 
