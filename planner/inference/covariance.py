@@ -15,9 +15,13 @@ def inverse(precision: np.ndarray) -> np.ndarray:
 
 
 def covariance_root(covariance: np.ndarray) -> np.ndarray:
-    """R (p, p) with R Rᵀ a covariance that is positive, but for rounding."""
+    """R = Rᵀ (p, p) with R Rᵀ a covariance that is positive, but for rounding.
+
+    The symmetric root is the one that hangs on no eigenvector's sign: what is drawn with it stays
+    the same to rounding.
+    """
     values, vectors = eigen(covariance)
-    return vectors * np.sqrt(np.maximum(values, 0.0))
+    return vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
 
 
 def eigen(symmetric: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

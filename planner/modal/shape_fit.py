@@ -110,13 +110,14 @@ class _ShapePoint:
     normal: np.ndarray
 
     def root(self, kept: np.ndarray) -> np.ndarray:
-        """(k, d) root of the covariance of the values that are kept (u,) bool."""
+        """(k, k) root of the covariance of the values that are kept (u,) bool, of no sign."""
         normal = self.normal[np.ix_(kept, kept)]
         unit = np.sqrt(np.maximum(np.diag(normal), 1e-300))
         values, vectors = np.linalg.eigh(normal / unit[:, None] / unit)
         # Rounding: share of the curvature
         some = values > 1e-13 * values[-1]
-        return vectors[:, some] / np.sqrt(values[some]) / unit[:, None]
+        own = vectors[:, some]
+        return own / np.sqrt(values[some]) @ own.T / unit[:, None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,6 +48,14 @@ def test_inverse_of_a_precision():
     np.testing.assert_allclose(inverse(precision) @ precision, np.eye(12), atol=1e-12)
 
 
+def test_a_root_hangs_on_no_sign_of_an_eigenvector():
+    """What is drawn with it is the same wherever the arrays lie: in another order, too."""
+    rng = np.random.default_rng(1)
+    matrix, order = np.cov(rng.standard_normal((12, 40))), rng.permutation(12)
+    there = covariance_root(matrix[np.ix_(order, order)])
+    np.testing.assert_allclose(there, covariance_root(matrix)[np.ix_(order, order)], atol=1e-13)
+
+
 def test_eigenvalues_where_divide_and_conquer_does_not_converge(monkeypatch):
     def fails(matrix):
         raise np.linalg.LinAlgError("Eigenvalues did not converge")

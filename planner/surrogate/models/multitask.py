@@ -18,7 +18,7 @@ from scipy.linalg import eigh
 
 from planner import jax_setup
 from planner.errors import InputError
-from planner.inference.covariance import covariance_root
+from planner.inference.covariance import eigen
 from planner.surrogate.ar1 import AR1
 from planner.surrogate.frequency_models import FEWEST, FrequencyData
 from planner.surrogate.kernels import parse
@@ -217,7 +217,8 @@ def first_guess(tasks: Tasks, rank: int | None) -> Hyperparameters:
     if rank is None:
         weights, own = np.linalg.cholesky(covariance + 0.1 * np.eye(t)), np.full(t, -np.inf)
     else:
-        weights = covariance_root(covariance)[:, ::-1][:, :rank]
+        values, vectors = eigen(covariance)
+        weights = (vectors * np.sqrt(np.maximum(values, 0.0)))[:, ::-1][:, :rank]
         own = np.full(t, np.log(OWN))
     theta, _ = parse(tasks.kernel, tasks.x.shape[1]).prior(1.0, NOISE, LENGTH, 0.0, 1.0)
     return Hyperparameters(weights, own, np.full(t, np.log(NOISE)), theta)
