@@ -52,6 +52,10 @@ class Alternative:
     rarer: float = 0.0
     expected: ExpectedFrfs | None = None
 
+    def sound(self, frf: Frf) -> tuple[Frf, float]:
+        """An FRF, of whichever sensors, as a sound chain would show it; see `ChainFault`."""
+        return (frf, 0.0) if self.fault is NONE else self.fault.undone(frf)
+
 
 @dataclass(frozen=True, eq=False)
 class StatedHits:
@@ -98,9 +102,7 @@ class StatedHits:
         value, size = self.density
 
         def shown(one: Alternative) -> tuple[Frf, float]:
-            if one.fault is NONE:  # of whichever sensors
-                return self.frf, 0.0
-            frf, volume = one.fault.undone(self.frf)
+            frf, volume = one.sound(self.frf)
             return frf, volume * columns * LINES
 
         def glanced(one: Alternative) -> float:

@@ -28,14 +28,19 @@ from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
 from planner.fit.visit_chains import strained
 from planner.frf.frf import Frf
+from planner.frf.metrics import complex_frac
 from planner.inference.parallel import parallel_map
 from planner.recording.joints import JointUnits
 from planner.recording.points import TOOL
+from planner.recording.repeats import LIKE
 
 NEAR_DEG = 2.0  # to the setpoint, in which angles that are none of degrees are recognised
 # Measured poses before which another structure may explain what nothing known fits: until then
 # the simulation alone tells of the chain, as before the first; no joint is looked for elsewhere.
 SURE = 2
+ELSEWHERE = Alternative(
+    np.zeros(0), "look as if of another pose: without them all others agree.", about="earlier"
+)
 
 
 def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
@@ -58,7 +63,7 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
         likely += (one for one in free if one.what not in said)
     if stated.agree(likely):
         return None
-    mistakes = [*likely, *_poses(claim)]
+    mistakes = [*likely, *_poses(claim, frf)]
     if sure:
         mistakes += alternatives.flipped_signs(claim.joints, claim.joints_deg)
         mistakes += alternatives.joint_offsets(claim.joints, expected, frf, claim.joints_deg)
@@ -69,30 +74,47 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
     if (
         fits is None
         or (fits.about == "readback" and not fits.rival)
-        or (fits.about != "chain" and StatedHits(expected, fits.q, frf).doubted)
+        or StatedHits(expected, fits.q, fits.sound(frf)[0]).doubted
     ):
-        fits = _earlier(claim, fit.posterior, frf) or fits
+        lacks = fits is None or not fit.posterior.explains  # what was found, of the poses before
+        fits = (
+            _earlier(claim, fit.posterior, frf)
+            or (_elsewhere_before(claim, fit, frf) if lacks else None)
+            or fits
+        )
     if fits is None and not stated.impossible:
         return None
     if fits is None and not sure:
         return None if answered else chain_mismatch(claim, measured.frf)
     if _other_before(claim, fit, frf, fits):
         return None  # the import tells of that pose
-    fits = fits or _elsewhere_before(claim, fit, frf)
     return _asked(claim.pose, 100 * expected.off(q, frf), fits)
 
 
-def _poses(claim: Claim) -> Iterator[Alternative]:
-    """Where else the robot may be."""
-    state = claim.state
+def _poses(claim: Claim, frf: Frf) -> Iterator[Alternative]:
+    """Where else the robot may be: where it was hit before, if the FRF is like that of then."""
+    state, model = claim.state, claim.model
+    shown = {m.pose: own for m, own in zip(model.used, model.frfs, strict=True)}
     known = {m.pose: m.joints_deg for m in state.used}
     known |= {name: state.proposals[name].joints_deg for name in state.open}
     known.pop(claim.pose, None)
     for name, there in known.items():
         what = f"fit {name} far better"
         if state.hit_at(name):
+            if name in shown and not _alike(frf, shown[name]):
+                continue
             what = f"repeat those of {name}, if those were of {name}"
         yield Alternative(claim.joints.internal(there), what, name)
+
+
+def _alike(frf: Frf, before: Frf) -> bool:
+    """Whether two FRFs of the tool are as like as repeated hits are."""
+    both = frf.measured & before.measured if frf.layout == before.layout == TOOL else None
+    if both is None or not both.any():
+        return True
+    hz, ours = frf.frequency_hz, frf.accelerance[:, both]
+    at = np.abs(before.frequency_hz - hz[:, None]).argmin(axis=1)  # the nearest line
+    return complex_frac(ours.ravel(), before.accelerance[:, both][..., at].ravel()) > LIKE**2
 
 
 def _setpoint(claim: Claim) -> list[Alternative]:
@@ -157,8 +179,7 @@ def _elsewhere_before(claim: Claim, fit: IdentifiedRobot, frf: Frf) -> Alternati
         others = [i for i in range(len(every.q)) if i != k]
         frfs = tuple(every.frfs[i] for i in others)
         if explains_all(replace(every, frfs=frfs, q=every.q[others]).found()):
-            what = "look as if of another pose: without them all others agree."
-            return Alternative(every.q[k], what, m.pose, about="earlier")
+            return replace(ELSEWHERE, pose=m.pose)
     return None
 
 
@@ -216,18 +237,14 @@ class PosesTogether:
         """
         new = len(self.q) - 1
         tried = [*(i for i in range(min(new, PLACED)) if i not in answered), new]
-        angles = parallel_map(lambda i: self._angle(i, likely[i]), tried)
-        found = [(i, angle) for i, angle in zip(tried, angles, strict=True) if angle is not None]
-        if not any(i < new for i, _ in found):
-            return None
-        (stated, _), *each = parallel_map(self._evidence, [None, *found])
-        (most, explains, (i, angle)), *others = sorted(
-            ((*one, which) for one, which in zip(each, found, strict=True)),
-            key=lambda one: one[0],
-            reverse=True,
-        )
-        least = max([stated, *(value for value, _, (k, _) in others if k == new)])
-        return (i, angle) if i < new and explains and most > least + LOG_ODDS else None
+        each = parallel_map(lambda i: self._set_aside(i, likely[i]), tried)
+        angles = [(i, angle) for i, (_, angle) in zip(tried, each, strict=True) if angle]
+        (stated, _), *together = parallel_map(self._evidence, [None, *angles])
+        found = [(*one, *which) for one, which in zip(together, angles, strict=True)]
+        found += [(*alone, i, ELSEWHERE) for i, (alone, _) in zip(tried, each, strict=True)]
+        (most, explains, i, how), *others = sorted(found, key=lambda one: one[0], reverse=True)
+        least = max([stated, *(value for value, _, k, _ in others if k == new)])
+        return (i, how) if i < new and explains and most > least + LOG_ODDS else None
 
     def _fit(self, q: np.ndarray, poses: Sequence[int]) -> StructureFit:
         """Of some of the poses, at q (n, dof)."""
@@ -235,16 +252,22 @@ class PosesTogether:
         prior = p.structure.prior
         return Search(prior, frfs, q[list(poses)], self.band_hz, p.tolerances).freed(p)
 
-    def _angle(self, i: int, likely: Sequence[Alternative]) -> Alternative | None:
-        """Of one pose, by which it fits the others better; None where none does."""
+    def _set_aside(
+        self, i: int, likely: Sequence[Alternative]
+    ) -> tuple[tuple[float, bool], Alternative | None]:
+        """Evidence with one pose elsewhere, wherever that is, and whether the others then agree;
+        the angle by which it fits them better, None where none does."""
         others = [k for k in range(len(self.q)) if k != i]
-        expected = ExpectedFrfs(RobotPosterior.of(self._fit(self.q, others)), self.band_hz)
+        fit = self._fit(self.q, others)
+        expected = ExpectedFrfs(RobotPosterior.of(fit), self.band_hz)
         stated = tuple(self.joints.shown(self.q[i]))
         hits = StatedHits(expected, self.q[i], self.frfs[i], len(others) >= PLACED)
         typed = [*likely, *alternatives.flipped_signs(self.joints, stated)]
         if len(others) >= SURE and not hits.agree():
             typed += alternatives.joint_offsets(self.joints, expected, self.frfs[i], stated)
-        return hits.best_alternative(typed)
+        agree = len(others) >= SURE and explains_all(fit)
+        alone = fit.evidence + hits.outlier_log_density, agree
+        return alone, hits.best_alternative(typed)
 
     def _evidence(self, one: tuple[int, Alternative] | None) -> tuple[float, bool]:
         """Of all together, with one pose's other angle, and whether that explains them."""
