@@ -24,6 +24,7 @@ MASS_SD, CENTRE_SD, SECOND_SD = 0.06, 0.01, 0.08  # the centre's in units of the
 GAIN_SD, CROSS_SD, FORCE_SD, PLACE_M = 0.02, 0.04, 0.02, 0.006
 TILT_RAD, OFFSET_M, READBACK_RAD = np.radians(2.0), 0.005, np.radians(0.07)
 WITHIN = 2.0  # tolerances: what lies beyond is no longer a robot as stated
+FAR_OFF = (-0.8, -0.4, 0.4, 0.8)  # of what is within tolerance, where one spring's fit begins
 STAGES = (0.5, 0.2, 0.07, 0.02, 0.01, 0.003)  # of |H|; at the last what imperfections come to
 STEPS, LONGEST = 12, 1.5  # at most at each stage; tolerances a step
 STEADY = 0.003  # a step that lowers chi2 by a smaller share is the last one of its stage
@@ -151,14 +152,23 @@ def detectability(question: DetectionProblem) -> Detectability:
     """Of an effect by the best robot without it."""
     first = question.poses[0].robot
     inertia = [(n, c) for n, b in question.bodies.items() for c in b.changes(question.reach_m)]
-    moves = np.zeros(3 * len(first.springs) + len(inertia))
-    chi2, sizes = np.inf, [_size(question, inertia, moves, np.zeros(13))]
+    moves = _begun(question, inertia, np.zeros(3 * len(first.springs) + len(inertia)))
+    chi2, sizes = np.inf, [_size(question, inertia, 0 * moves, np.zeros(13))]
     for error in STAGES:
         moves, found = _descended(partial(_sums, question, inertia, error=error), moves)
         chi2 = found.chi2 - float(moves @ moves)
         chain = np.clip(found.chain, -WITHIN, WITHIN)
         sizes.append(_size(question, inertia, moves, chain))
     return Detectability(max(0.0, chi2) / 2, min(sizes), sizes[0])
+
+
+def _begun(question: DetectionProblem, inertia: list, moves: np.ndarray) -> np.ndarray:
+    """Moves, or with one stated spring far off: small steps don't find that past resonances."""
+    springs = question.poses[0].robot.springs
+    stated = [3 * i for i, spring in enumerate(springs) if spring.sd == STATED_SD]
+    far = np.eye(len(moves))[stated]
+    tried = [moves, *(moves + WITHIN * share * one for share in FAR_OFF for one in far)]
+    return min(tried, key=lambda m: _size(question, inertia, m, np.zeros(13)))
 
 
 def _size(question: DetectionProblem, inertia: list, moves: np.ndarray, chain: np.ndarray) -> float:

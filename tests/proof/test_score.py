@@ -11,6 +11,7 @@ from planner.errors import InputError
 from planner.proof import run
 from planner.proof.make import deck
 from planner.proof.refit import (
+    STATED_SD,
     Body,
     DetectionProblem,
     Observed,
@@ -201,22 +202,30 @@ S = 2j * np.pi * np.linspace(4, 60, 40)
 BODY = Body(10.0, np.zeros(3), 0.2 * np.eye(3))
 
 
-def question(factor: float, extra_kg: float = 0.0, hose_kg: float = 0.0) -> DetectionProblem:
-    """A mass on springs along three axes; what is seen has stiffer ones, or more mass."""
-    stiffness, damping = np.array([1e5, 2e5, 4e5]), np.array([30.0, 40.0, 60.0])
+def question(
+    factor: float,
+    extra_kg: float = 0.0,
+    hose_kg: float = 0.0,
+    first: float = 1.0,
+    damped: float = 1,
+) -> DetectionProblem:
+    """A mass on springs along three axes; what is seen has stiffer ones, the first by a factor of
+    its own, or more mass."""
+    stiffness, damping = np.array([1e5, 2e5, 4e5]), damped * np.array([30.0, 40.0, 60.0])
     turning = np.eye(3) * 1e4
 
-    def snapshot(factor: float, extra_kg: float, hose_kg: float) -> Snapshot:
+    def snapshot(first: float, factor: float, extra_kg: float, hose_kg: float) -> Snapshot:
         mass = np.diag([10.0 + extra_kg] * 3 + [0.4] * 3)
         rest = np.zeros((6, 6))
         rest[3:, 3:] = turning
         at = S[:, None, None]
+        own_stiffness = factor * stiffness * [first, 1.0, 1.0]
         springs = [
-            Spring(np.eye(6)[j], np.full(len(S), factor * k + 0j), c, factor * k, 0.25)
-            for j, (k, c) in enumerate(zip(stiffness, damping, strict=True))
+            Spring(np.eye(6)[j], np.full(len(S), k + 0j), c, k, STATED_SD)
+            for j, (k, c) in enumerate(zip(own_stiffness, damping, strict=True))
         ]
         z = at**2 * mass + rest + at * np.diag([*damping, 20.0, 20.0, 20.0])
-        z = z + np.diag([*(factor * stiffness), 0, 0, 0])
+        z = z + np.diag([*own_stiffness, 0, 0, 0])
         own = hose_kg * (2 * np.pi * 25) ** 2 * (1 + 0.05j)
         hose = own * S**2 * hose_kg / (own + S**2 * hose_kg) if hose_kg else 0 * S
         z = z + hose[:, None, None] * np.diag([1, 1, 1, 0, 0, 0])
@@ -225,7 +234,8 @@ def question(factor: float, extra_kg: float = 0.0, hose_kg: float = 0.0) -> Dete
     def frf(robot: Snapshot) -> np.ndarray:
         return (S**2)[:, None, None] * np.linalg.inv(robot.z)[:, :3, :3]
 
-    without, seen = snapshot(1.0, 0.0, 0.0), frf(snapshot(factor, extra_kg, hose_kg))
+    without = snapshot(1.0, 1.0, 0.0, 0.0)
+    seen = frf(snapshot(first, factor, extra_kg, hose_kg))
     observed = Observed(seen, np.full(seen.shape, 1e-10), np.array([4, 4, 4]))
     poses = [Pose(without, np.zeros((1, *seen.shape), complex), [observed])] * 3
     return DetectionProblem(S, poses, [(without, seen)], {"link_1": BODY}, 1.0, 1.0)
@@ -236,6 +246,8 @@ def question(factor: float, extra_kg: float = 0.0, hose_kg: float = 0.0) -> Dete
     [
         ({"factor": 1.2}, 0.0, 0.003),  # a spring within its tolerance is no effect
         ({"factor": 1.0, "extra_kg": 0.5}, 0.0, 0.003),
+        # A light damper's resonance is passed on the way.
+        ({"factor": 1.0, "first": 0.65, "damped": 0.03}, 0.0, 0.003),
         ({"factor": 2.5}, 0.05, 2.0),  # far beyond
         ({"factor": 1.0, "hose_kg": 0.3}, 0.02, 2.0),  # what no spring and no mass can be
     ],
