@@ -63,7 +63,7 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
         likely += (one for one in free if one.what not in said)
     if stated.agree(likely):
         return None
-    mistakes = [*likely, *_poses(claim, frf)]
+    mistakes = [*likely, *known_poses(claim, frf)]
     if sure:
         mistakes += alternatives.flipped_signs(claim.joints, claim.joints_deg)
         mistakes += alternatives.joint_offsets(claim.joints, expected, frf, claim.joints_deg)
@@ -91,7 +91,7 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
     return _asked(claim.pose, 100 * expected.off(q, frf), fits)
 
 
-def _poses(claim: Claim, frf: Frf) -> Iterator[Alternative]:
+def known_poses(claim: Claim, frf: Frf) -> Iterator[Alternative]:
     """Where else the robot may be: where it was hit before, if the FRF is like that of then."""
     state, model = claim.state, claim.model
     shown = {m.pose: own for m, own in zip(model.used, model.frfs, strict=True)}

@@ -236,26 +236,38 @@ class _Search:
 
         `null` is the evidence of a linear one.
         """
-        found = []
-        for effect, shape in SHAPES:
-            sign, points = self._begun(rho, motions, shape, left)
-            now = rho
-            while True:
-                best = self._descended(self.at(now), motions, shape, sign, points, left)
-                after = [v - c for v, c in zip(left, best.changes, strict=True)]
-                nats, lower = self.most_probable(lambda w, after=after: evidence(w, after), now)
-                if lower >= now:
-                    break
-                now, points = lower, best.p[None]
-            cost = np.linalg.slogdet(best.normal)[1] + np.sum(((best.p - MEAN) / SD) ** 2)
-            nats -= null + 0.5 * float(cost + 2 * np.log(SD).sum())
-            numbers = best.p[:2] + np.log([motions.stiffness, motions.size])
-            covariance = np.linalg.inv(best.normal)[:2, :2]
-            told = numbers_of(effect, port.slides, sign, numbers, covariance)
-            table = None if effect == UNKNOWN else _table(port, motions, shape, sign, best.p)
-            law = LevelLaw(effect, port.at, nats, told, share_of(self.groups, best.changes), table)
-            found.append(_Fit(law, best.changes, lower))
+        found = [self._fit(rho, port, motions, law, left, null) for law in SHAPES]
+        # By what the best leaves the others are judged, from where they would begin beside that.
+        least = min(f.rho for f in found)
+        for i, (law, fit) in enumerate(zip(SHAPES, found, strict=True)):
+            if fit.rho > least:
+                again = self._fit(least, port, motions, law, left, null)
+                found[i] = max(fit, again, key=lambda f: f.law.gain_nats)
         return found
+
+    def _fit(
+        self, rho: float, port: JointPort, motions: JointMotions, law: tuple[str, Step],
+        left: Values, null: float,
+    ) -> _Fit:  # fmt: skip
+        """One law at a joint, from a discrepancy."""
+        effect, shape = law
+        sign, points = self._begun(rho, motions, shape, left)
+        now = rho
+        while True:
+            best = self._descended(self.at(now), motions, shape, sign, points, left)
+            after = [v - c for v, c in zip(left, best.changes, strict=True)]
+            nats, lower = self.most_probable(lambda w, after=after: evidence(w, after), now)
+            if lower >= now:
+                break
+            now, points = lower, best.p[None]
+        cost = np.linalg.slogdet(best.normal)[1] + np.sum(((best.p - MEAN) / SD) ** 2)
+        nats -= null + 0.5 * float(cost + 2 * np.log(SD).sum())
+        numbers = best.p[:2] + np.log([motions.stiffness, motions.size])
+        covariance = np.linalg.inv(best.normal)[:2, :2]
+        told = numbers_of(effect, port.slides, sign, numbers, covariance)
+        table = None if effect == UNKNOWN else _table(port, motions, shape, sign, best.p)
+        share = share_of(self.groups, best.changes)
+        return _Fit(LevelLaw(effect, port.at, nats, told, share, table), best.changes, lower)
 
     def _begun(
         self, rho: float, motions: JointMotions, shape: Step, left: Values

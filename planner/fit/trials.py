@@ -163,12 +163,17 @@ class Trials:
             least = rough.evidence + WON_BACK * (best - rough.evidence)
         near = _best_of_each(p for p in pool if p and p.evidence > least)
         near = _best_of_each(parallel_map(lambda p: self._stepped(p, data), near[:FOLLOWED]))
-        won = near[0].evidence - base.evidence if near else 0.0
-        near = [p for p in near if p.evidence - base.evidence >= min(WON_BACK * won, won)][:count]
-        ends = parallel_map(lambda p: self._settled(p, data), near)
+        named = [f for f in (self._from(p, data) for p in near) if self._may_be_told(base, f)]
+        won = named[0].evidence - base.evidence if named else 0.0
+        named = [f for f in named if f.evidence - base.evidence >= min(WON_BACK * won, won)][:count]
+        ends = parallel_map(lambda f: settled(f.misfit, f.at).tried, named)
         found = (self._from(p, data) for p in ends)
-        told = (f for f in found if self.may_be_named(base, f, f.structure.effects[-1]))
-        return sorted(told, key=evidence_of, reverse=True)
+        return sorted(
+            (f for f in found if self._may_be_told(base, f)), key=evidence_of, reverse=True
+        )
+
+    def _may_be_told(self, fewer: StructureFit, found: StructureFit) -> bool:
+        return self.may_be_named(fewer, found, found.structure.effects[-1])
 
     def may_be_named(self, fewer: StructureFit, found: StructureFit, effect: Operator) -> bool:
         """Whether an effect that is there beside `fewer` changes FRFs enough, or counts anyway."""
@@ -179,10 +184,6 @@ class Trials:
     def _stepped(self, tried: Tried, data: FrfData) -> Tried:
         misfit, x = self.again(tried.record, data, tried.record.size)
         return stepped(misfit, x, FURTHER, tried.record.own).tried
-
-    def _settled(self, tried: Tried, data: FrfData) -> Tried:
-        found = self._from(tried, data)
-        return settled(found.misfit, found.at).tried
 
     def _from(self, tried: Tried, data: FrfData) -> StructureFit:
         misfit, x = self.again(tried.record, data, tried.record.size)

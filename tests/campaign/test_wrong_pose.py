@@ -17,6 +17,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import Question
 from planner.campaign.import_checks import Claim, question_about
 from planner.campaign.low_fidelity import LowFidelity
+from planner.campaign.pose_mismatch import known_poses
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
@@ -66,6 +67,11 @@ def test_another_pose_is_asked_about_before_three_are_measured(tmp_path):
     repeated = [asked(i, again) for i in range(OTHERS)]
     assert [one and one.fits for one in repeated] == ["P001"] * OTHERS
     assert all("repeat those of P001" in one.text for one in repeated if one)
+    # Only what is like the hits of then may repeat them.
+    claim = Claim(campaign.model, campaign.state, "X", tuple(np.rad2deg(q[0]).tolist()))
+    for one, repeats in ((again, True), *((one, False) for one in found)):
+        there = [a.pose for a in known_poses(claim, one.one_hit_frf.within(BAND_HZ))]
+        assert ("P001" in there) == repeats
 
 
 def test_a_wrong_angle_at_the_first_pose_is_asked_about(tmp_path):
