@@ -59,16 +59,17 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
     said = "".join(answered)  # not asked again
     likely = _setpoint(claim)
     if sure and frf.layout == TOOL:
-        free = alternatives.loose(expected, q, placed)
-        likely += (one for one in free if one.what not in said)
+        likely += alternatives.loose(expected, q, placed)
     if stated.agree(likely):
         return None
     mistakes = [*likely, *known_poses(claim, frf)]
     if sure:
         mistakes += alternatives.flipped_signs(claim.joints, claim.joints_deg)
         mistakes += alternatives.joint_offsets(claim.joints, expected, frf, claim.joints_deg)
-    mistakes += (m for m in alternatives.chain_faults(expected, q, frf, sure) if m.what not in said)
+    mistakes += alternatives.chain_faults(expected, q, frf, sure)
     fits = stated.best_alternative(mistakes)
+    if fits is not None and fits.what in said:
+        return None
     # Another known pose, or the setpoint, is none by chance; any angle may be, of this pose or of
     # one before.
     if (
@@ -103,7 +104,7 @@ def known_poses(claim: Claim, frf: Frf) -> Iterator[Alternative]:
         if state.hit_at(name):
             if name in shown and not _alike(frf, shown[name]):
                 continue
-            what = f"repeat those of {name}, if those were of {name}"
+            what = f"are like those measured at {name}, if those were hit there"
         yield Alternative(claim.joints.internal(there), what, name)
 
 

@@ -14,6 +14,7 @@ from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
 from planner.fit.structure import RobotStructure
+from planner.fit.weights import Weights
 from planner.frf.frf import Frf
 from planner.inference.covariance import inverse
 from planner.measurement.nuisances import OF_HAMMER, OF_SENSOR, Tolerances
@@ -21,6 +22,7 @@ from planner.measurement.nuisances import OF_HAMMER, OF_SENSOR, Tolerances
 LINES, STEPS = 44, 5
 SIZES = (0.2, 0.06, 0.015, 0.004)  # of the pose's own discrepancy, if it is what it is said to be
 SPREAD = 1.0  # of its logarithm about that of the poses before
+NOTHING = 1e-300  # no record
 STRANGE = 0.6  # where it is something else: little is left of what is expected
 
 
@@ -99,8 +101,15 @@ class ExpectedFrfs:
         return self._of(FrfData.of(prior, (frf,), q[None], self.band_hz, LINES), size)
 
     def _of(self, data: FrfData, size: float) -> FrfMisfit:
-        structure = self._structure(data.measured.layout.sensors)
-        return FrfMisfit(structure, data, self.tolerances, size)
+        """Where all that was measured is smaller than expected, as by a wrong unit of the force,
+        what is expected says how large a discrepancy is."""
+        structure, m = self._structure(data.measured.layout.sensors), data.measured
+        own = replace(data)
+        misfit = FrfMisfit(structure, own, self.tolerances, size)
+        h = misfit.motion(structure.mean, None).accelerance
+        there = (float(np.linalg.norm(np.where(m.used, a, 0.0))) for a in (h, m.accelerance))
+        vars(own)["weights"] = Weights(m, max(1.0, next(there) / max(next(there), NOTHING)))
+        return misfit
 
     def outlier_log_density(self, q: np.ndarray, frf: Frf) -> float:
         """Log density of an FRF measured at q (dof,) in rad if it is hardly what is expected."""

@@ -146,7 +146,7 @@ class IdentifiedRobot:
             return found and f"In the recordings, but not in robot.toml: {found}"
         if self.poses == 1:  # many sets of causes explain a single pose
             return self.unplaced
-        of = "One explanation of both poses, of several that there may be"
+        of = "Together these explain both poses, as other sets of causes may"
         return f"{self.unplaced} {of}: {found}"
 
     @property

@@ -239,7 +239,7 @@ def _remarks(found: PoleIdentification, doubtful: tuple[Mode, ...]) -> tuple[str
     if doubtful:
         left_out = [f"{mode.frequency_hz:.4g}" for mode in doubtful]
         remarks.append(
-            f"Left out as artefacts (probability below {LEAST_PROBABILITY:g}): poles at"
-            f" {', '.join(left_out)} Hz."
+            f"Poles that this FRF alone does not show to be modes (probability below"
+            f" {LEAST_PROBABILITY:g}): {', '.join(left_out)} Hz."
         )
     return tuple(remarks)

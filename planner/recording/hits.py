@@ -105,11 +105,7 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
     if len(forces) != 1:
         raise InputError(
             f"{source} holds {describe(record)}: a hit needs exactly one force in N; "
-            + (
-                f"{nameless} state no unit: name columns such as Force [N] and Acc X [m/s²]."
-                if (nameless := without_unit(record))
-                else "export force and accelerations together."
-            )
+            + _unit_or(record, "export force and accelerations together.")
         )
     accelerations = [c for c in record.channels if c.quantity == "acceleration"]
     accelerations, left_out = _at_points(accelerations, stated)
@@ -179,7 +175,7 @@ def _responses(
     if not whole or (of_tool and not set(of_tool) >= set(tool)):
         raise InputError(
             f"{record.source} holds {describe(record)}: a hit needs one acceleration in each of x, "
-            f"y and z; export all three with their directions, if the file is whole."
+            "y and z; " + _unit_or(record, "export all three with their directions.")
         )
     return found
 
@@ -207,8 +203,8 @@ def _anywhere(
         found[dof] = channel
     if not found:
         raise InputError(
-            f"{record.source} holds {describe(record)}: a hit needs an acceleration; export force "
-            f"and accelerations together."
+            f"{record.source} holds {describe(record)}: a hit needs an acceleration; "
+            + _unit_or(record, "export force and accelerations together.")
         )
     return found
 
@@ -245,10 +241,19 @@ def without_unit(record: TimeRecord) -> str:
     return ", ".join(c.name for c in record.channels if c.quantity == "unknown")
 
 
+def _unit_or(record: TimeRecord, remedy: str) -> str:
+    """What to do about channels whose unit is not known, else another `remedy`."""
+    if nameless := without_unit(record):
+        return (
+            f"the unit of {nameless} is not known: name columns such as Force [N] and Acc X [m/s²]."
+        )
+    return remedy
+
+
 def describe(record: TimeRecord) -> str:
     """What a record holds, in words: "2 accelerations (m/s^2), 1 pressure (Pa)"."""
     counts = Counter(
-        f"{c.quantity} ({c.unit})" if c.quantity != "unknown" else "unlabelled record"
+        f"{c.quantity} ({c.unit})" if c.quantity != "unknown" else "channel without a known unit"
         for c in record.channels
     )
     return ", ".join(f"{n} × {text}" for text, n in counts.items())

@@ -17,7 +17,8 @@ COLUMNS = "joint and axis", "stated", "refitted ± sd", "unit", "known"
 MASS_COLUMNS = "link", "stated ± sd (kg)", "refitted ± sd (kg)"
 NOT_KNOWN = (
     "Known, yes: the recordings determine it (sd at most half of the tolerance of robot.toml). No: "
-    "the value rests on robot.toml, or is so far from it that another effect may have moved it."
+    "they say little of it, and robot.toml's value stands; or it is so far off that another effect "
+    "may have moved it."
 )
 
 

@@ -108,7 +108,7 @@ def _in(report: ImportReport) -> str:
 
 def not_now(key: str) -> str:
     """What is said of a key that does nothing here; those that do are on the page."""
-    shown = key if key.isprintable() else repr(key)
+    shown = key if key.isprintable() else "Enter" if key in "\r\n" else repr(key)
     return f"{shown} does nothing now; the keys that do are those above in [brackets]."
 
 

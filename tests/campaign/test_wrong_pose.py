@@ -66,7 +66,7 @@ def test_another_pose_is_asked_about_before_three_are_measured(tmp_path):
     assert not any(asked(i, found[i]) for i in range(OTHERS))
     repeated = [asked(i, again) for i in range(OTHERS)]
     assert [one and one.fits for one in repeated] == ["P001"] * OTHERS
-    assert all("repeat those of P001" in one.text for one in repeated if one)
+    assert all("are like those measured at P001" in one.text for one in repeated if one)
     # Only what is like the hits of then may repeat them.
     claim = Claim(campaign.model, campaign.state, "X", tuple(np.rad2deg(q[0]).tolist()))
     for one, repeats in ((again, True), *((one, False) for one in found)):
@@ -128,16 +128,19 @@ def case(tmp_path_factory) -> Case:
     return everyday("arm of four", 7002, tmp_path_factory.mktemp("case"))
 
 
-def test_another_tool_is_asked_about_and_the_same_one_is_not(case):
+def test_another_tool_and_a_wrong_unit_are_asked_about_and_nothing_else(case):
     campaign = CaseCampaign.of(case)
     state = campaign.state(POSES, unlisted=[POSES])
     claim = Claim(campaign.model(state), state, "X", campaign.angles(case.q[POSES]))
+    right = case.measured[POSES].hits
+    in_millinewtons = tuple(replace(hit, force_n=1e3 * hit.force_n) for hit in right)
     asked = [
-        question_about(claim, MeasuredPose((), case.band_hz, given=poses[POSES].hits))
-        for poses in (case.measured, case.heavier)
+        question_about(claim, MeasuredPose((), case.band_hz, given=hits))
+        for hits in (right, case.heavier[POSES].hits, in_millinewtons)
     ]
     assert asked[0] is None
     assert OTHER_TOOL in asked[1].text
+    assert "1000 times too small: units" in asked[2].text
 
 
 @pytest.mark.slow
