@@ -101,14 +101,15 @@ class ExpectedFrfs:
         return self._of(FrfData.of(prior, (frf,), q[None], self.band_hz, LINES), size)
 
     def _of(self, data: FrfData, size: float) -> FrfMisfit:
-        """Where all that was measured is smaller than expected, as by a wrong unit of the force,
+        """Where all that was measured is far smaller than expected, as by a wrong unit of forces,
         what is expected says how large a discrepancy is."""
         structure, m = self._structure(data.measured.layout.sensors), data.measured
         own = replace(data)
         misfit = FrfMisfit(structure, own, self.tolerances, size)
         h = misfit.motion(structure.mean, None).accelerance
         there = (float(np.linalg.norm(np.where(m.used, a, 0.0))) for a in (h, m.accelerance))
-        vars(own)["weights"] = Weights(m, max(1.0, next(there) / max(next(there), NOTHING)))
+        level = STRANGE * next(there) / max(next(there), NOTHING)
+        vars(own)["weights"] = Weights(m, max(1.0, level))
         return misfit
 
     def outlier_log_density(self, q: np.ndarray, frf: Frf) -> float:
