@@ -66,7 +66,7 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
     if sure:
         mistakes += alternatives.flipped_signs(claim.joints, claim.joints_deg)
         mistakes += alternatives.joint_offsets(claim.joints, expected, frf, claim.joints_deg)
-    mistakes += alternatives.chain_faults(expected, q, frf, sure)
+    mistakes += (m for m in alternatives.chain_faults(expected, q, frf, sure) if m.what not in said)
     fits = stated.best_alternative(mistakes)
     if fits is not None and fits.what in said:
         return None
@@ -77,10 +77,9 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
         or (fits.about == "readback" and not fits.rival)
         or StatedHits(expected, fits.q, fits.sound(frf)[0]).doubted
     ):
-        lacks = fits is None or not fit.posterior.explains  # what was found, of the poses before
         fits = (
             _earlier(claim, fit.posterior, frf)
-            or (_elsewhere_before(claim, fit, frf) if lacks else None)
+            or (None if fit.posterior.explains else _elsewhere_before(claim, fit, frf))
             or fits
         )
     if fits is None and not stated.impossible:
@@ -115,7 +114,8 @@ def _alike(frf: Frf, before: Frf) -> bool:
         return True
     hz, ours = frf.frequency_hz, frf.accelerance[:, both]
     at = np.abs(before.frequency_hz - hz[:, None]).argmin(axis=1)  # the nearest line
-    return complex_frac(ours.ravel(), before.accelerance[:, both][..., at].ravel()) > LIKE**2
+    theirs = before.accelerance[:, both][..., at]
+    return bool(complex_frac(ours.ravel(), theirs.ravel()) > LIKE**2)
 
 
 def _setpoint(claim: Claim) -> list[Alternative]:

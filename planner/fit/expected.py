@@ -101,21 +101,24 @@ class ExpectedFrfs:
         return self._of(FrfData.of(prior, (frf,), q[None], self.band_hz, LINES), size)
 
     def _of(self, data: FrfData, size: float) -> FrfMisfit:
-        """Where all that was measured is far smaller than expected, as by a wrong unit of forces,
-        what is expected says how large a discrepancy is."""
-        structure, m = self._structure(data.measured.layout.sensors), data.measured
-        own = replace(data)
-        misfit = FrfMisfit(structure, own, self.tolerances, size)
-        h = misfit.motion(structure.mean, None).accelerance
-        there = (float(np.linalg.norm(np.where(m.used, a, 0.0))) for a in (h, m.accelerance))
-        level = STRANGE * next(there) / max(next(there), NOTHING)
-        vars(own)["weights"] = Weights(m, max(1.0, level))
-        return misfit
+        structure = self._structure(data.measured.layout.sensors)
+        return FrfMisfit(structure, data, self.tolerances, size)
 
     def outlier_log_density(self, q: np.ndarray, frf: Frf) -> float:
         """Log density of an FRF measured at q (dof,) in rad if it is hardly what is expected."""
         misfit = self._misfit(q, frf, STRANGE)
-        return misfit.evidence(misfit(misfit.structure.mean))
+        at, m = misfit(misfit.structure.mean), misfit.data.measured
+        # Where far less was measured, as by a wrong unit of forces, it differs by what is expected;
+        # after one pose that is not known well enough.
+        there = (float(np.linalg.norm(np.where(m.used, a, 0.0)))
+                 for a in (at.motion.accelerance, m.accelerance))  # fmt: skip
+        level = STRANGE * next(there) / max(next(there), NOTHING)
+        if level > 1.0 and len(self.posterior.found.misfit.data.q) > 1:
+            data = replace(misfit.data)
+            vars(data)["weights"] = Weights(m, level)
+            misfit = replace(misfit, data=data)
+            at = misfit(misfit.structure.mean)
+        return misfit.evidence(at)
 
     def density(self, q: np.ndarray, frf: Frf) -> tuple[float, float]:
         """The same if it is, but for a discrepancy like that of the poses before; its size."""
