@@ -77,11 +77,7 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
         or (fits.about == "readback" and not fits.rival)
         or StatedHits(expected, fits.q, fits.sound(frf)[0]).doubted
     ):
-        fits = (
-            _earlier(claim, fit.posterior, frf)
-            or (None if fit.posterior.explains else _elsewhere_before(claim, fit, frf))
-            or fits
-        )
+        fits = _earlier(claim, fit.posterior, frf) or fits
     if fits is None and not stated.impossible:
         return None
     if fits is None and not sure:
@@ -149,39 +145,21 @@ def _earlier(claim: Claim, found: RobotPosterior, frf: Frf) -> Alternative | Non
     return replace(wrong[1], pose=every[wrong[0]].pose, about="earlier") if wrong else None
 
 
-def _few_together(claim: Claim, fit: IdentifiedRobot, frf: Frf) -> Search | None:
-    """A search over all hits, the new ones last, where few poses were measured; else None."""
-    if not SURE <= fit.poses <= PLACED or frf.layout.sensors != TOOL.sensors:
-        return None
-    q = np.array([*(claim.joints.internal(m.joints_deg) for m in claim.model.used), claim.q])
-    known, frfs = fit.posterior, (*claim.model.frfs, frf)
-    return Search(known.structure.prior, frfs, q, claim.band_hz, known.tolerances)
-
-
 def _other_before(claim: Claim, fit: IdentifiedRobot, frf: Frf, fits: Alternative | None) -> bool:
     """Whether a pose before, not this one, was measured by another chain than the others.
 
     It has bent what is expected, where few poses were measured; all together tell whose it was.
     """
-    search, known = _few_together(claim, fit, frf), fit.posterior.found
-    if search is None or not (fits is None or fits.about == "chain") or not strained(known):
+    few = SURE <= fit.poses <= PLACED and frf.layout.sensors == TOOL.sensors
+    of_chain, known = fits is None or fits.about == "chain", fit.posterior
+    if not (few and of_chain and strained(known.found)):
         return False
-    found = search.found(known.remembered)
+    q = [claim.joints.internal(m.joints_deg) for m in claim.model.used]
+    q, frfs = np.array([*q, claim.q]), (*claim.model.frfs, frf)
+    search = Search(known.structure.prior, frfs, q, claim.band_hz, known.tolerances)
+    found = search.found(known.found.remembered)
     *before, here = np.atleast_1d(found.misfit.data.multiples)
     return explains_all(found) and here == 1.0 < max(before)
-
-
-def _elsewhere_before(claim: Claim, fit: IdentifiedRobot, frf: Frf) -> Alternative | None:
-    """A pose before without whose hits all others agree: they may be of any other pose."""
-    every = _few_together(claim, fit, frf)
-    if every is None:
-        return None
-    for k, m in reversed([*enumerate(claim.model.used)]):
-        others = [i for i in range(len(every.q)) if i != k]
-        frfs = tuple(every.frfs[i] for i in others)
-        if explains_all(replace(every, frfs=frfs, q=every.q[others]).found()):
-            return replace(ELSEWHERE, pose=m.pose)
-    return None
 
 
 def _called_right(state: CampaignState) -> tuple[str, ...]:
@@ -231,7 +209,7 @@ class PosesTogether:
         self, likely: Sequence[Sequence[Alternative]], answered: Container[int] = ()
     ) -> tuple[int, Alternative] | None:
         """The earlier pose, and its angle, with which all is explained, and likelier than as
-        stated, or with any angle of the new pose.
+        stated, or with any angle of the new pose; or the one without which all others agree.
 
         Of the first ones, that is: what came later was asked about when it came. `likely` are each
         pose's own alternatives; the angles of those `answered` are right.

@@ -14,7 +14,6 @@ from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
 from planner.fit.structure import RobotStructure
-from planner.fit.weights import Weights
 from planner.frf.frf import Frf
 from planner.inference.covariance import inverse
 from planner.measurement.nuisances import OF_HAMMER, OF_SENSOR, Tolerances
@@ -22,7 +21,6 @@ from planner.measurement.nuisances import OF_HAMMER, OF_SENSOR, Tolerances
 LINES, STEPS = 44, 5
 SIZES = (0.2, 0.06, 0.015, 0.004)  # of the pose's own discrepancy, if it is what it is said to be
 SPREAD = 1.0  # of its logarithm about that of the poses before
-NOTHING = 1e-300  # no record
 STRANGE = 0.6  # where it is something else: little is left of what is expected
 
 
@@ -110,13 +108,12 @@ class ExpectedFrfs:
         at, m = misfit(misfit.structure.mean), misfit.data.measured
         # Where far less was measured, as by a wrong unit of forces, it differs by what is expected;
         # after one pose that is not known well enough.
-        there = (float(np.linalg.norm(np.where(m.used, a, 0.0)))
-                 for a in (at.motion.accelerance, m.accelerance))  # fmt: skip
-        level = STRANGE * next(there) / max(next(there), NOTHING)
-        if level > 1.0 and len(self.posterior.found.misfit.data.q) > 1:
-            data = replace(misfit.data)
-            vars(data)["weights"] = Weights(m, level)
-            misfit = replace(misfit, data=data)
+        expected, shown = (
+            np.linalg.norm(h[m.used]) for h in (at.motion.accelerance, m.accelerance)
+        )
+        poses = len(self.posterior.found.misfit.data.q)
+        if poses > 1 and 0.0 < shown < STRANGE * expected:
+            misfit = misfit.with_rho(float(STRANGE**2 * expected / shown))
             at = misfit(misfit.structure.mean)
         return misfit.evidence(at)
 

@@ -18,13 +18,9 @@ JITTER = 1e-6  # of the discrepancy's variance, that each line has for itself
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Of measured FRFs; what is found of a discrepancy's size ρ is kept.
-
-    It is proportional to FRFs that are so many times as large (`level`), all together.
-    """
+    """Of measured FRFs; what is found of a discrepancy's size ρ is kept."""
 
     measured: Measured
-    level: float = 1.0
 
     @cached_property
     def size(self) -> np.ndarray:
@@ -34,7 +30,7 @@ class Weights:
         square = np.where(m.used, np.abs(m.accelerance) ** 2, 0.0)
         count = np.maximum(m.used.sum(axis=(1, 2), keepdims=True), 1)
         rms = np.sqrt(square.sum(axis=(1, 2), keepdims=True) / count)
-        size = self.level * np.sqrt(square + SHARE**2 * rms**2)
+        size = np.sqrt(square + SHARE**2 * rms**2)
         return np.where(size > 0, size, 1.0)
 
     @cached_property
@@ -52,7 +48,7 @@ class Weights:
 
     def __getstate__(self) -> Mapping[str, object]:
         """For another process, which finds the rest itself."""
-        return {"measured": self.measured, "level": self.level}
+        return {"measured": self.measured}
 
     def whitening(self, rho: float) -> np.ndarray:
         """(n, r, c, F, F): inverse of the covariance's root, of real and imaginary part each."""
