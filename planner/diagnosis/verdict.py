@@ -22,7 +22,9 @@ from planner.fit.explanations import (
     Key,
     added,
     built,
+    gone,
     key_of,
+    matched,
     most_probable,
     probabilities,
 )
@@ -167,21 +169,22 @@ class _Sizes:
         """Of the likeliest set, smallest first given up.
 
         What is too small to count is gone when the others are weighed: two hoses that stand for one
-        would each hide how much the other matters.
+        would each hide how much the other matters. Where another takes its place, that is gone.
         """
         fit, left = self.best, list(added(self.best))
         found = [self.weigh(fit, e, e)[0] for e in _beyond(fit)]
         while left:
             # What was settled by itself has effects of its own: those of the best are told.
-            pairs = zip(sorted(added(fit), key=_name), sorted(left, key=_name), strict=True)
-            each = sorted(
-                (self.weigh(fit, e, own) for e, own in pairs), key=lambda pair: pair[0].change
-            )
-            slight = next(((e, fewer) for e, fewer in each if not e.counts and fewer), None)
-            if slight is None:
-                found += [effect for effect, _ in each]
+            weighed = [(*self.weigh(fit, e, own), e) for e, own in matched(fit, self.best, left)]
+            slight = [
+                (effect, fewer)
+                for effect, fewer, e in sorted(weighed, key=lambda one: one[0].change)
+                if not effect.counts and fewer and gone(fewer, fit) == [e]
+            ]
+            if not slight:
+                found += [effect for effect, _, _ in weighed]
                 break
-            effect, fit = slight
+            effect, fit = slight[0]
             found.append(effect)
             left = [own for own in left if own is not effect.operator]
         return sorted(found, key=lambda e: -e.change)
@@ -195,10 +198,6 @@ class _Sizes:
             found += [self.weigh(fit, e, e)[0] for e in new]
             known |= {e.name for e in new}
         return found
-
-
-def _name(effect: Operator) -> Place:
-    return effect.name
 
 
 def _counts(effect: Operator, nats: float, change: float, matters: float, gained: float) -> bool:
@@ -223,7 +222,7 @@ def _without(
 ) -> StructureFit | None:
     """The best that there is without an effect: refitted from here, or as the search came by."""
     rest = Counter(key_of(best)) - Counter([effect.name])
-    met = [f for f in explored.settled if Counter(key_of(f)) == rest and effect in added(best)]
+    met = [f for f in explored.settled if Counter(key_of(f)) == rest and gone(f, best) == [effect]]
     fewer = None if any(f.settled for f in met) else without(best, [effect])
     if fewer is not None:
         met.append(settled(fewer.misfit, fewer.at, rounds=2))

@@ -1,15 +1,17 @@
 """Sets of effects that were fitted to the same FRFs: which are likely, and which is likeliest."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from planner.effects.effect import Operator
 from planner.fit.fitted import StructureFit
 from planner.inference.log_space import shares
 
 RARE = 5.0  # nats: one effect at one place, of some 70, is so much rarer than none
+UNLIKE = 1e12  # squared sds apart of what is called otherwise
 
 # Effects and their places, one of them as often as it is there.
 Key = tuple[tuple[str, str], ...]
@@ -60,3 +62,26 @@ def most_probable(fits: Iterable[StructureFit]) -> StructureFit:
 def log_probability(found: StructureFit) -> float:
     """Logarithm of how likely it is: its evidence, and how rare so many effects are."""
     return found.evidence - RARE * len(added(found))
+
+
+def matched(
+    fit: StructureFit, other: StructureFit, effects: Sequence[Operator]
+) -> list[tuple[Operator, Operator]]:
+    """What was added to a fit, each with that of another's `effects` which is called the same and
+    fewest sds away: a link may carry several hoses."""
+    mine, theirs = added(fit), dict(zip(other.structure.effects, other.structure.own, strict=True))
+    own = dict(zip(fit.structure.effects, fit.structure.own, strict=True))
+    apart = np.full((len(mine), len(effects)), UNLIKE)
+    for k, f in enumerate(effects):
+        known = np.linalg.inv(other.at.covariance[theirs[f], theirs[f]])
+        for i in (i for i, e in enumerate(mine) if e.name == f.name):
+            away = fit.at.x[own[mine[i]]] - other.at.x[theirs[f]]
+            apart[i, k] = min(float(away @ known @ away), UNLIKE)
+    pairs = zip(*linear_sum_assignment(apart), strict=True)
+    return [(mine[i], effects[k]) for i, k in pairs]
+
+
+def gone(fewer: StructureFit, fit: StructureFit) -> list[Operator]:
+    """What of the effects added to a fit is not in another that has fewer."""
+    kept = [there for _, there in matched(fewer, fit, added(fit))]
+    return [effect for effect in added(fit) if effect not in kept]

@@ -8,7 +8,7 @@ import pytest
 
 from planner.diagnosis.verdict import NamedEffect, Verdict
 from planner.effects.resonator import LinkResonator
-from planner.fit.explanations import RARE, probabilities
+from planner.fit.explanations import RARE, gone, probabilities
 from planner.fit.fitted import StructureFit
 
 
@@ -44,3 +44,18 @@ def test_a_second_hose_is_as_rare_on_the_same_link_as_on_another():
     weights = list(probabilities([same, apart, alone]).values())
     assert weights[0] == pytest.approx(weights[1])
     assert weights[2] / weights[0] == pytest.approx(np.exp(2 * RARE))
+
+
+def test_the_hose_that_is_gone_is_told_by_its_numbers_and_not_by_its_label():
+    def fit(**frequencies: float) -> Any:
+        effects = tuple(LinkResonator(at.replace("_second", "#2"), ()) for at in frequencies)
+        own = tuple(slice(i, i + 1) for i in range(len(effects)))
+        structure = SimpleNamespace(effects=effects, own=own, prior=SimpleNamespace(built=()))
+        x, known = np.array(list(frequencies.values())), np.eye(len(effects))
+        return SimpleNamespace(structure=structure, at=SimpleNamespace(x=x, covariance=known))
+
+    both = fit(link_5=20.0, link_5_second=30.0)
+    first, second = both.structure.effects
+    # What was left has moved to where the first was, or has not.
+    assert gone(fit(link_5_second=20.1), both) == [second]
+    assert gone(fit(link_5_second=29.9), both) == [first]
