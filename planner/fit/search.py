@@ -110,11 +110,12 @@ class Search(Trials):
     def _beside_known(self, first: StructureFit, warm: FitRecord | None) -> StructureFit:
         """The likeliest beside what a fit has, and beside what is stated."""
         same = np.array_equal(first.misfit.data.multiples, all_visits(self.multiples, len(self.q)))
-        known = [first if same else self.recovered(first.tried.record)]
-        if warm is not None and (self.widen or not explained(known[0])):
-            known.append(self.plain())
-        # What stands in for what fewer poses could not tell may hide it: from both, apart.
-        best = most_probable(one for k in known for one in self._explore([k], warm is not None))
+        known = first if same else self.recovered(first.tried.record)
+        best = most_probable(self._explore([known], warm is not None))
+        # What stands in for what fewer poses could not tell may hide it: where the new pose changes
+        # what was found, it is looked for from what is stated, too.
+        if warm is not None and (key_of(best) != key_of(known) or not explained(best)):
+            best = most_probable([best, *self._explore([self.plain()], True)])
         # All springs may give at once, which none of them shows alone; but what did not explain
         # fewer poses is only mended.
         if not explained(best) and (warm is None or warm.size <= SIZES[0]):

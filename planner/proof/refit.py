@@ -3,7 +3,7 @@
 An engine says what a robot without the effect is at each pose (`Snapshot`) and what is seen with
 the effect (`Observed`). The robot is refitted, nonlinearly, within twice its tolerances: springs,
 dampers, loss factors, inertias, those of imperfections and of other effects alike; sensor's gains,
-cross-axis, place and the force's gain; and at each pose misses of hits, and readback.
+cross-axis, place, delay and the force's gain; and at each pose misses of hits, and readback.
 
     chi2 = |r - D x|² + |x|², in units of noise and of an error of |H|, x in tolerances (1 sd)
 
@@ -21,8 +21,9 @@ from planner.proof.mechanics import cross_matrix
 
 SPRING_SD, STATED_SD, DAMPING_SD, LOSS_SD = 0.5, 0.25, 0.5, 0.02
 MASS_SD, CENTRE_SD, SECOND_SD = 0.06, 0.01, 0.08  # the centre's in units of the robot's reach
-GAIN_SD, CROSS_SD, FORCE_SD, PLACE_M = 0.02, 0.04, 0.02, 0.006
+GAIN_SD, CROSS_SD, FORCE_SD, PLACE_M, DELAY_S = 0.02, 0.04, 0.02, 0.006, 6e-5
 TILT_RAD, OFFSET_M, READBACK_RAD = np.radians(2.0), 0.005, np.radians(0.07)
+CHAIN = 14  # numbers of the chain
 WITHIN = 2.0  # tolerances: what lies beyond is no longer a robot as stated
 FAR_OFF = (-0.8, -0.4, 0.4, 0.8)  # of what is within tolerance, where one spring's fit begins
 STAGES = (0.5, 0.2, 0.07, 0.02, 0.01, 0.003)  # of |H|; at the last what imperfections come to
@@ -153,7 +154,7 @@ def detectability(question: DetectionProblem) -> Detectability:
     first = question.poses[0].robot
     inertia = [(n, c) for n, b in question.bodies.items() for c in b.changes(question.reach_m)]
     moves = _begun(question, inertia, np.zeros(3 * len(first.springs) + len(inertia)))
-    chi2, sizes = np.inf, [_size(question, inertia, 0 * moves, np.zeros(13))]
+    chi2, sizes = np.inf, [_size(question, inertia, 0 * moves, np.zeros(CHAIN))]
     for error in STAGES:
         moves, found = _descended(partial(_sums, question, inertia, error=error), moves)
         chi2 = found.chi2 - float(moves @ moves)
@@ -168,7 +169,7 @@ def _begun(question: DetectionProblem, inertia: list, moves: np.ndarray) -> np.n
     stated = [3 * i for i, spring in enumerate(springs) if spring.sd == STATED_SD]
     far = np.eye(len(moves))[stated]
     tried = [moves, *(moves + WITHIN * share * one for share in FAR_OFF for one in far)]
-    return min(tried, key=lambda m: _size(question, inertia, m, np.zeros(13)))
+    return min(tried, key=lambda m: _size(question, inertia, m, np.zeros(CHAIN)))
 
 
 def _size(question: DetectionProblem, inertia: list, moves: np.ndarray, chain: np.ndarray) -> float:
@@ -177,7 +178,7 @@ def _size(question: DetectionProblem, inertia: list, moves: np.ndarray, chain: n
     off = whole = 0.0
     for robot, seen in pairs:
         frf = _moved(robot, question.s, inertia, moves)[1]
-        shown = frf[:, :3, :3] + np.tensordot(chain, _chain_columns(frf), 1)
+        shown = frf[:, :3, :3] + np.tensordot(chain, _chain_columns(frf, question.s), 1)
         off += float(np.sum(np.abs(seen - shown) ** 2))
         whole += float(np.sum(np.abs(seen) ** 2))
     return float(np.sqrt(off / whole))
@@ -212,15 +213,15 @@ def _moved(
     return np.array(found), frf
 
 
-def _chain_columns(frf: np.ndarray) -> np.ndarray:
-    """(13, F, 3, 3): gains and cross-axis (9), sensor's place (3), force's gain."""
+def _chain_columns(frf: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """(CHAIN, F, 3, 3): gains and cross-axis (9), sensor's place (3), force's gain, delay."""
     h, found = frf[:, :3, :3], []
     for i, j in np.ndindex(3, 3):
         unit = np.zeros((3, 3))
         unit[i, j] = GAIN_SD if i == j else CROSS_SD
         found.append(unit @ h)
     found += [PLACE_M * cross_matrix(unit) @ frf[:, 3:, :3] for unit in np.eye(3)]
-    return np.array([*found, FORCE_SD * h])
+    return np.array([*found, FORCE_SD * h, -DELAY_S * s[:, None, None] * h])
 
 
 def _misses(frf: np.ndarray, hits: np.ndarray) -> np.ndarray:
@@ -273,7 +274,7 @@ def _at_pose(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Normal equations of a pose over moves and chain; its hits and readback are eliminated."""
     shared, frf = _moved(pose.robot, question.s, inertia, moves, slopes=True)
-    shared = np.concatenate([shared, _chain_columns(frf)])
+    shared = np.concatenate([shared, _chain_columns(frf, question.s)])
     rows, local, residual = [], [], []
     for number, seen in enumerate(pose.sets):
         size2 = np.mean(np.abs(seen.frf) ** 2, axis=(1, 2), keepdims=True)

@@ -208,9 +208,10 @@ def question(
     hose_kg: float = 0.0,
     first: float = 1.0,
     damped: float = 1,
+    late_s: float = 0.0,
 ) -> DetectionProblem:
     """A mass on springs along three axes; what is seen has stiffer ones, the first by a factor of
-    its own, or more mass."""
+    its own, or more mass, or comes late."""
     stiffness, damping = np.array([1e5, 2e5, 4e5]), damped * np.array([30.0, 40.0, 60.0])
     turning = np.eye(3) * 1e4
 
@@ -235,7 +236,7 @@ def question(
         return (S**2)[:, None, None] * np.linalg.inv(robot.z)[:, :3, :3]
 
     without = snapshot(1.0, 1.0, 0.0, 0.0)
-    seen = frf(snapshot(first, factor, extra_kg, hose_kg))
+    seen = frf(snapshot(first, factor, extra_kg, hose_kg)) * np.exp(-S * late_s)[:, None, None]
     observed = Observed(seen, np.full(seen.shape, 1e-10), np.array([4, 4, 4]))
     poses = [Pose(without, np.zeros((1, *seen.shape), complex), [observed])] * 3
     return DetectionProblem(S, poses, [(without, seen)], {"link_1": BODY}, 1.0, 1.0)
@@ -246,6 +247,7 @@ def question(
     [
         ({"factor": 1.2}, 0.0, 0.003),  # a spring within its tolerance is no effect
         ({"factor": 1.0, "extra_kg": 0.5}, 0.0, 0.003),
+        ({"factor": 1.0, "late_s": 1.19e-4}, 0.0, 0.003),
         # A light damper's resonance is passed on the way.
         ({"factor": 1.0, "first": 0.65, "damped": 0.03}, 0.0, 0.003),
         ({"factor": 2.5}, 0.05, 2.0),  # far beyond
