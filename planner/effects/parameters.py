@@ -168,7 +168,8 @@ def unit_of(kind: str, slide: bool) -> str:
 
 def place_name(block: Compliance) -> str:
     """Where an elastic degree of freedom is: "joint_2 about z", "base along x"."""
-    return f"{block.joint} {'along' if block.slide else 'about'} {axis_name(block.axis)}"
+    how = "along" if block.slide or block.lever_m else "about"
+    return f"{block.joint} {how} {axis_name(block.axis)}"
 
 
 def axis_name(axis: tuple[float, float, float]) -> str:

@@ -89,7 +89,7 @@ class EffectLibrary:
             if joined is None:
                 continue
             wider = joined
-            bounds |= _bounds(block, scale)
+            bounds |= {} if block.lever_m else _bounds(block, scale)
             found.append((kind, at))
         stated, groups = len(config.compliance), {}
         for number, key in enumerate(found, stated):
@@ -115,7 +115,10 @@ class EffectLibrary:
 def _joined(robot: Robot, block: Compliance) -> Robot | None:
     """With one more spring; None where that moves no inertia of its own, as a base's on a rail."""
     config = robot.config
-    if place_name(block) in {place_name(one) for one in config.compliance}:
+    there = config.compliance
+    if place_name(block) in {place_name(one) for one in there}:
+        return None
+    if block.lever_m and block.tie not in {one.tie for one in there}:
         return None
     wider = msgspec.structs.replace(config, compliance=(*config.compliance, block))
     found = replace(robot, config=wider)
@@ -154,9 +157,20 @@ def _springs(robot: Robot) -> list[tuple[type[Operator], str, Compliance, float]
         if length > SHORT * longest:
             own = [b.stiffness for b in turning if b.joint == joint] or [stiffest]
             at, scale = f"link_{names.index(joint) + 1}", BEND * max(own)
-            axes = (*across(way / length), way / length)
-            found += [(BendingLink, at, _spring(link, axis, scale), scale) for axis in axes]
+            found += [(BendingLink, at, one, scale) for one in _beam(link, way, scale)]
     return found
+
+
+def _beam(link: str, way: np.ndarray, scale: float) -> list[Compliance]:
+    """Of a uniform beam along `way` (3,): how its middle turns, and gives across as it bends."""
+    length, found = float(np.linalg.norm(way)), list[Compliance]()
+    sides, lever = across(way / length), length / np.sqrt(12)
+    for axis, other in zip(sides, sides[::-1], strict=True):
+        turns, gives = _spring(link, axis, scale), _spring(link, other, scale)
+        tied = place_name(turns)
+        found.append(msgspec.structs.replace(turns, tie=tied))
+        found.append(msgspec.structs.replace(gives, tie=tied, lever_m=float(lever)))
+    return [*found, _spring(link, way / length, scale)]
 
 
 def _links(robot: Robot) -> list[tuple[str, str, np.ndarray]]:

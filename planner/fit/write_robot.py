@@ -46,8 +46,11 @@ def updated_toml(
         table.update(joint=block.joint, axis=list(block.axis), stiffness=0.0, damping=0.0)
         if block.slide:
             table["slide"] = True
-        if block.height_m:
-            table["height_m"] = float(f"{block.height_m:.{DIGITS}g}")
+        for key in ("height_m", "lever_m"):
+            if getattr(block, key):
+                table[key] = float(f"{getattr(block, key):.{DIGITS}g}")
+        if block.tie:
+            table["tie"] = block.tie
         springs.append(table)
         blocks.append(table)
     for estimate in result.estimates:

@@ -37,7 +37,9 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     damping). Blocks with the same `tie` share their stiffness, damping and loss factor, also when
     those are identified. `height_m` is how high over the URDF's origin the axis of a base's
     rotation lies (below it: negative, as on a pedestal that rocks about its foot); the base then
-    needs the shifts that go with that.
+    needs the shifts that go with that. `lever_m` makes a link's block a shift of so many metres a
+    rad: a beam's middle gives across, too, and a uniform one of length L by L / √12 as much as it
+    turns (Euler and Bernoulli's 12EI/L³ beside EI/L).
     """
 
     joint: str
@@ -51,6 +53,7 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     stiffness_n_m: float | None = None
     damping_n_s_m: float | None = None
     height_m: float = 0.0
+    lever_m: float = 0.0
 
     def __post_init__(self) -> None:
         """Once read, a shift is a block with `slide`, whose stiffness is in N/m."""

@@ -79,6 +79,7 @@ def _elastic(robot: Robot, own: np.ndarray, springs: np.ndarray, size: int) -> n
     linkage, moves = robot.linkage, np.zeros((size, len(springs)))
     moves[springs, np.arange(len(springs))] = 1.0
     for number, block in enumerate(robot.config.compliance):
+        moves[springs[number], number] = block.lever_m or 1.0
         if block.joint in robot.joint_names and block.slide == robot.slides(block.joint):
             leader = robot.joint_names.index(block.joint)
             factors = linkage.spread[:, leader].copy()
@@ -210,7 +211,8 @@ def _add_joints(
             if block.joint == where:
                 name = f"{where}/elastic_{number}"
                 axis = np.array(block.axis, dtype=float)
-                outer = _add_joint(model, outer, axis, place, name, block.slide)
+                shifts = block.slide or block.lever_m > 0
+                outer = _add_joint(model, outer, axis, place, name, shifts)
                 elastic[number], place = model.joints[outer].idx_q, pin.SE3.Identity()
         return outer
 

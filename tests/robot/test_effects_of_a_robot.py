@@ -1,6 +1,7 @@
 """What [[effects]] and a base of robot.toml add, against another engine and by formulas."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from planner.dynamics.simulation import Simulation
@@ -9,7 +10,7 @@ from planner.proof.arms import ARMS
 from planner.proof.deviation import AttachedMass, AttachedResonator, Deviation, Spring
 from planner.proof.load import load_truth
 from planner.robot.robot import Robot
-from planner.robot.virtual_joints import inertia_basis
+from planner.robot.virtual_joints import inertia_basis, virtual_model
 
 LINES = np.linspace(4.0, 60.0, 40)
 BALL = "inertia_kg_m2 = [3e-3, 0, 0, 3e-3, 0, 3e-3]\n"
@@ -189,3 +190,23 @@ def test_a_height_that_nothing_goes_with_is_refused(case, tmp_path):
     replaced, words = WRONG_HEIGHTS[case]
     with pytest.raises(InputError, match=words):
         Simulation(column(tmp_path, **replaced))
+
+
+def test_a_link_that_turns_and_gives_half_way_bends_as_a_uniform_beam(tmp_path):
+    """Its tip gives by L³/3EI, L²/2EI and L/EI under a force and a moment across."""
+    path, k = ARMS["kr210"].write(tmp_path), 4e6
+    length = float(Robot.load(path).model.jointPlacements[3].translation[0])  # along its x
+    of = f'\n[[compliance]]\njoint = "link_2"\nstiffness = {k}\ndamping = 2e3\ntie = "beam"\n'
+    lever = f"axis = [0, 1, 0]\nlever_m = {length / np.sqrt(12)}\n"
+    path.write_text(f"{path.read_text()}{of}axis = [0, 0, 1]\n{of}{lever}")
+    robot = Robot.load(path)
+    model = virtual_model(robot)
+    data, tip = model.model.createData(), model.model.getJointId("joint_3")
+    pin.computeJointJacobians(model.model, data, model.offset)
+    moved = pin.getJointJacobian(model.model, data, tip, pin.LOCAL_WORLD_ALIGNED) @ model.elastic
+    own = moved[:, [b.joint == "link_2" for b in robot.config.compliance]]
+    gives = own @ own.T / k
+    shift, turn, both = np.linalg.norm(gives[:3, :3]), gives[3:, 3:], gives[:3, 3:]
+    assert shift == pytest.approx(length**2 / 3 / k)
+    assert np.linalg.norm(turn) == pytest.approx(1 / k)
+    assert np.linalg.norm(both) == pytest.approx(length / 2 / k)
