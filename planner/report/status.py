@@ -3,19 +3,16 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
-import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.model_status import DecisionStatus, LeftOutValues, found_without, left_out
+from planner.campaign.model_status import DecisionStatus, found_without, left_out
 from planner.campaign.state import Measurement
-from planner.design.stopping import Forecast
 from planner.errors import InputError
 from planner.report.answer import Done
 from planner.report.imports import asked_of
@@ -25,7 +22,6 @@ from planner.report.springs import (
     COLUMNS,
     MASS_COLUMNS,
     NOT_KNOWN,
-    RefittedLink,
     RefittedSpring,
     refitted_masses,
     refitted_springs,
@@ -43,47 +39,25 @@ if TYPE_CHECKING:
 KEPT = "diagnosis.json"  # as `diagnose --out` writes it
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ModelStatus:
-    """What `status` says of the model; sds (count,) in % are over the workspace, mode by mode."""
+def _of_model(model: "Model") -> dict[str, Any]:
+    """What `status` says of the model; sds (count,) in % are over the workspace, mode by mode.
 
-    robot: str
-    joint_names: tuple[str, ...]
-    frequency_sd_percent: np.ndarray
-    target_frequency_sd_percent: float
-    done: bool
-    forecast: Forecast
-    remarks: tuple[str, ...]
-    leave_one_out: LeftOutValues
-    decision: DecisionStatus | None = None  # where the campaign is for a cut
-    joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
-    springs: tuple[RefittedSpring, ...] = ()  # none where the simulation does not learn
-    masses: tuple[RefittedLink, ...] = ()  # of links, where the recordings tell them
-    waits_for: str = ""  # what lacks until the target is reached
-    frf_sd_percent: tuple[float, ...] = ()  # of predicted FRFs, and of their common scale
-    not_predicted: str = ""  # modes that every pose shows beside those predicted
-
-    @classmethod
-    def of(cls, model: "Model") -> "ModelStatus":
-        """Of a campaign's model."""
-        cell = model.cell
-        return cls(
-            robot=cell.robot.name,
-            joint_names=tuple(cell.robot.joint_names),
-            frequency_sd_percent=model.frequency_sd_percent,
-            target_frequency_sd_percent=cell.config.stop.frequency_sd_percent,
-            done=bool(model.done),
-            forecast=model.forecast,
-            remarks=model.remarks,
-            leave_one_out=left_out(model),
-            decision=DecisionStatus.of(model),
-            joint_units=cell.robot.joints.declared,
-            springs=refitted_springs(model),
-            masses=refitted_masses(model),
-            waits_for=model.waits_for,
-            frf_sd_percent=model.frf_sd_percent,
-            not_predicted=model.not_predicted,
-        )
+    "decision" is there where the campaign is for a cut, "springs" where the simulation learns,
+    "masses" of links where the recordings tell them; "waits_for" lacks until the target is reached;
+    "frf_sd_percent" is of predicted FRFs, and of their common scale; "not_predicted" are modes that
+    every pose shows beside those predicted.
+    """
+    cell = model.cell
+    return {
+        "robot": cell.robot.name, "joint_names": tuple(cell.robot.joint_names),
+        "frequency_sd_percent": model.frequency_sd_percent,
+        "target_frequency_sd_percent": cell.config.stop.frequency_sd_percent,
+        "done": bool(model.done), "forecast": model.forecast, "remarks": model.remarks,
+        "leave_one_out": left_out(model), "decision": DecisionStatus.of(model),
+        "joint_units": cell.robot.joints.declared, "springs": refitted_springs(model),
+        "masses": refitted_masses(model), "waits_for": model.waits_for,
+        "frf_sd_percent": model.frf_sd_percent, "not_predicted": model.not_predicted,
+    }  # fmt: skip
 
 
 def status(
@@ -97,12 +71,12 @@ def status(
     "decision" is there where the campaign is for a cut, `models` where they were compared.
     """
     state, directory = campaign.state, campaign.directory
-    believed = campaign.of_model("status", ModelStatus, ModelStatus.of)
+    believed = campaign.of_model("status", dict, _of_model)
     kept = diagnosis or diagnosis_of(directory)
-    beside = two_answers(believed.springs, read_diagnosis(kept)) if kept else ""
+    beside = two_answers(believed["springs"], read_diagnosis(kept)) if kept else ""
 
     def draw() -> "dict[str, Figure]":
-        if not believed.leave_one_out.values:
+        if not believed["leave_one_out"].values:
             return {}
         from planner.report.campaign_plots import left_out_figure
 
@@ -110,10 +84,10 @@ def status(
         return {"leave_one_out": left_out_figure(*found_without(campaign.model), title)}
 
     written = (pictures or Pictures()).write(draw, directory.name, simulated=state.simulated)
-    keys = vars(believed) | {
-        "remarks": (*believed.remarks, *filter(None, (beside,))),
-        "forecast": forecast_json(believed.forecast),
-        "decision": believed.decision or msgspec.UNSET,
+    keys = believed | {
+        "remarks": (*believed["remarks"], *filter(None, (beside,))),
+        "forecast": forecast_json(believed["forecast"]),
+        "decision": believed["decision"] or msgspec.UNSET,
         "campaign": str(directory), "simulated": state.simulated,
         "measurements": [_pose(m, m.pose in state.starred) for m in state.measured],
         "open": [state.proposals[pose] for pose in state.open],
@@ -174,18 +148,18 @@ def _counts(measured: Sequence[Mapping[str, Any]], used: int) -> str:
     return f"{counted(used, 'pose')} measured{more}"
 
 
-def _lines(believed: ModelStatus, keys: Mapping[str, Any]) -> list[str]:
+def _lines(believed: Mapping[str, Any], keys: Mapping[str, Any]) -> list[str]:
     held = ", ".join(h["pose"] for h in keys["held"])
     waiting = f"; hit, and waiting for your answer: {held}" if held else ""
     lines = [
         "open: " + (", ".join(p.pose for p in keys["open"]) or "none") + waiting,
         "skipped: " + (", ".join(s["pose"] for s in keys["skipped"]) or "none"),
-        sds_over_workspace(believed.frequency_sd_percent, believed.target_frequency_sd_percent),
-        standing(believed.forecast, believed.waits_for, believed.not_predicted),
+        sds_over_workspace(keys["frequency_sd_percent"], keys["target_frequency_sd_percent"]),
+        standing(believed["forecast"], keys["waits_for"], keys["not_predicted"]),
         f"log: {counted(keys['log']['entries'], 'entry', 'entries')}",
     ]
-    if believed.frf_sd_percent:
-        whole, scale = map(significant, believed.frf_sd_percent)
+    if keys["frf_sd_percent"]:
+        whole, scale = map(significant, keys["frf_sd_percent"])
         lines.insert(3, f"sd of predicted FRFs over the workspace: {whole} %; {scale} % of it "
                         f"a factor common to all (gains and masses)")  # fmt: skip
     if keys["log"]["torn_bytes"]:
@@ -196,8 +170,8 @@ def _lines(believed: ModelStatus, keys: Mapping[str, Any]) -> list[str]:
             f"program stopped before the import: import again."
         )
     lines += [unanswered(h["question"]["text"]) for h in keys["held"]]
-    lines += [believed.decision.text] if believed.decision else []
-    lines += [*keys["remarks"], *believed.leave_one_out.text]
+    lines += [believed["decision"].text] if believed["decision"] else []
+    lines += [*keys["remarks"], *keys["leave_one_out"].text]
     told = by_reason((r["file"], r["reason"]) for r in keys["refused"])
     return lines + [f"refused {one}" for one in told]
 
@@ -237,7 +211,7 @@ def models_text(rows: "Sequence[LeftOutModel]") -> list[RenderableType]:
 
 def model_beside(campaign: Campaign, found: Mapping[str, Any]) -> str:
     """What to say where the campaign's model and a diagnosis of it, as JSON, give two answers."""
-    return two_answers(campaign.of_model("status", ModelStatus, ModelStatus.of).springs, found)
+    return two_answers(campaign.of_model("status", dict, _of_model)["springs"], found)
 
 
 def diagnosis_of(directory: Path, given: Path | None = None) -> Path | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.recording.joints import AxisColumn, JointUnits
+from planner.recording.points import AXES
 from planner.robot.config import (
     BASE,
     LISTS,
@@ -19,6 +20,7 @@ from planner.robot.config import (
     ControllerTable,
     DiagnoseTable,
     HitsTable,
+    PointTable,
     ReadbackTable,
     RobotConfig,
     SensorTable,
@@ -228,6 +230,32 @@ def _check_obstacles(config: RobotConfig, path: Path) -> None:
             _within(f"{entry}: size_m", size, " m", most=1e4)
         _finite(f"{entry}: center_m", block.center_m, 1e4, "finite numbers")
         _finite(f"{entry}: rpy_deg", block.rpy_deg, 1e4, "finite numbers")
+
+
+def check_points(points: Sequence[PointTable], path: Path) -> None:
+    """Raise InputError where an entry makes no sense by itself."""
+    names = [point.name for point in points]
+    nodes = [point.node for point in points]
+    for number, point in enumerate(points, 1):
+        entry = f"{path}: [[point]] number {number} ({point.name})"
+        if not point.name or point.name.isdigit() or any(c.isspace() for c in point.name):
+            raise InputError(
+                f'{path}: [[point]] number {number} is named "{point.name}"; give it a name '
+                f"without blanks that is no number."
+            )
+        if names.index(point.name) != number - 1:
+            raise InputError(f"{entry} is named like an earlier one; give each a name of its own.")
+        if point.node is not None and nodes.index(point.node) != number - 1:
+            other = names[nodes.index(point.node)]
+            raise InputError(f"{entry} has node {point.node}, which is {other}'s; correct one.")
+        if point.node is not None and point.node < 1:
+            raise InputError(f"{entry} has node {point.node}; give a number above 0.")
+        if not set(point.axes) <= set(AXES) or len(set(point.axes)) < max(len(point.axes), 1):
+            raise InputError(f'{entry} has axes {list(point.axes)}; give some of "x", "y", "z".')
+        if not 0 <= point.mass_kg < 1e3:
+            raise InputError(f"{entry} has mass_kg {point.mass_kg}; give 0 kg or more.")
+        if not all(abs(v) < 1e4 for v in (*point.position_m, *point.rpy_deg)):
+            raise InputError(f"{entry} has a position_m or rpy_deg that is no finite number.")
 
 
 def check_entries(robot: "Robot") -> None:
