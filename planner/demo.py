@@ -3,6 +3,7 @@
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,6 @@ from planner.dataset.visits import recordings_in
 from planner.errors import InputError, NoPoseLeftError
 from planner.progress import ProgressCallback
 from planner.report.answer import Done
-from planner.report.rerun.event_logger import EventLogger
 from planner.report.text import SIMULATED, number, table
 
 NAME = "kr240_plane"
@@ -40,6 +40,8 @@ def play(
     directory: Path | None, measurements: int, viewer: bool, progress: ProgressCallback
 ) -> Done:
     """Answer of `demo`: a campaign, played until its target, `measurements`, or the pool's end."""
+    from planner.report.rerun.campaign import RerunView
+
     source = shipped(NAME)
     directory = directory or Path(tempfile.mkdtemp(prefix="planner-demo-")) / NAME
     campaign = Campaign.new(directory, source / "robot" / "robot.toml", source / "campaign.toml")
@@ -49,7 +51,7 @@ def play(
     rrd = campaign.directory / "demo.rrd"
     steps: list[dict[str, Any]] = []
     started = time.perf_counter()
-    with EventLogger(campaign.cell, rrd, viewer, simulated=True) as story:
+    with closing(RerunView(campaign.cell, rrd, viewer, simulated=True)) as story:
         story.log(campaign.entries[0], campaign.model)
         proposal = campaign.next()[0]
         story.log(campaign.entries[-1], campaign.model)

@@ -30,8 +30,6 @@ from planner.report.text import ending, sds_over_workspace, table
 from planner.words import by_reason, counted, listed, local_time, significant
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from planner.campaign.model import Model
     from planner.campaign.model_comparison import LeftOutModel
     from planner.campaign.state import CampaignState
@@ -75,7 +73,7 @@ def status(
     kept = diagnosis or diagnosis_of(directory)
     beside = two_answers(believed["springs"], read_diagnosis(kept)) if kept else ""
 
-    def draw() -> "dict[str, Figure]":
+    def draw():
         if not believed["leave_one_out"].values:
             return {}
         from planner.report.campaign_plots import left_out_figure

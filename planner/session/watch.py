@@ -13,7 +13,6 @@ from planner.campaign.campaign import Campaign
 from planner.errors import InputError, PlannerError
 from planner.replay import replay
 from planner.report.answer import Answer
-from planner.report.rerun.event_logger import EventLogger
 from planner.session import session_text
 from planner.session.diagnosis_process import DiagnosisProcess
 from planner.session.hit_verdicts import HitVerdict, Part, Verdicts
@@ -72,8 +71,12 @@ def watch(
     with ExitStack() as stack:
         stack.enter_context(campaign.holding())
         source = keys or stack.enter_context(terminal_keys())
-        story = stack.enter_context(EventLogger(campaign.cell, rrd, viewer))
+        story = None
         if rrd is not None or viewer:  # a resumed session shows what went before, too
+            from planner.report.rerun.campaign import RerunView
+
+            story = RerunView(campaign.cell, rrd, viewer)
+            stack.callback(story.close)
             for step in replay(campaign):
                 story.log(step.entry, step.model, step.measured)
         explaining = DiagnosisProcess(campaign.directory) if explain else None

@@ -1,6 +1,7 @@
 """Rerun recordings: figures lie where their numbers say, views show something, robots move."""
 
 import re
+from contextlib import closing
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +16,6 @@ from planner.campaign.config import load_campaign_config
 from planner.campaign.events import Proposal
 from planner.replay import replay
 from planner.report.rerun.campaign import RerunView, _blueprint
-from planner.report.rerun.event_logger import EventLogger
 from planner.report.rerun.figures import one_by_one, open_stream, record_figures
 from planner.report.rerun.progress import MeasuredSeries
 from tests.support.rerun_columns import WORLD, Frames, columns_of, lines_of, rotation
@@ -98,7 +98,7 @@ def rows_of(rrd):
 def told(named, tmp_path_factory):
     """The campaign, its file, the rows of each entity, and its blueprint."""
     rrd = tmp_path_factory.mktemp("rrd") / "named.rrd"
-    with EventLogger(named.cell, rrd, viewer=False, simulated=True) as story:
+    with closing(RerunView(named.cell, rrd, simulated=True)) as story:
         for step in replay(named):
             story.log(step.entry, step.model, step.measured)
     return named, rrd, rows_of(rrd), _blueprint(named.cell, "progress/0").root_container
