@@ -20,7 +20,6 @@ from planner.robot.config import (
     ControllerTable,
     DiagnoseTable,
     HitsTable,
-    PointTable,
     ReadbackTable,
     RobotConfig,
     SensorTable,
@@ -96,6 +95,7 @@ def _check(config: RobotConfig, path: Path) -> None:
     _check_payloads(config, path)
     _check_links(config, path)
     _check_obstacles(config, path)
+    _check_points(config, path)
     for name in ("hits", "sensor", "readback", "diagnose"):
         check_sds(getattr(config, name), f"{path}: [{name}]")
     _within(f"{path}: [controller] speed_percent", config.controller.speed_percent, most=100)
@@ -232,11 +232,10 @@ def _check_obstacles(config: RobotConfig, path: Path) -> None:
         _finite(f"{entry}: rpy_deg", block.rpy_deg, 1e4, "finite numbers")
 
 
-def check_points(points: Sequence[PointTable], path: Path) -> None:
-    """Raise InputError where an entry makes no sense by itself."""
-    names = [point.name for point in points]
-    nodes = [point.node for point in points]
-    for number, point in enumerate(points, 1):
+def _check_points(config: RobotConfig, path: Path) -> None:
+    names = [point.name for point in config.point]
+    nodes = [point.node for point in config.point]
+    for number, point in enumerate(config.point, 1):
         entry = f"{path}: [[point]] number {number} ({point.name})"
         if not point.name or point.name.isdigit() or any(c.isspace() for c in point.name):
             raise InputError(

@@ -16,7 +16,6 @@ from planner.robot.config_file import (
     check_entries,
     check_laws,
     check_own_springs,
-    check_points,
     load_config,
     with_axes,
 )
@@ -92,7 +91,6 @@ class Robot:
         robot = cls(
             config, robot_toml, urdf, text, model, linkage, joints, low, high, speed, left_out
         )
-        check_points(config.point, robot_toml)
         robot._add_points()
         check_entries(robot)
         check_own_springs(robot)
