@@ -1,7 +1,6 @@
 """robot.toml read and checked: what is wrong is said in one sentence."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -295,12 +294,13 @@ def check_entries(robot: "Robot") -> None:
         )
 
 
-def axes_of(
+def controller_axes(
     table: ControllerTable, joints: JointUnits, path: Path
-) -> list[tuple[str, float, float]]:
-    """The controller's axes in order: joint of the URDF, sign, offset in degrees (slides: mm).
+) -> dict[str, AxisColumn]:
+    """By joint of the URDF its column in tables that count as the controller does.
 
-    Raises InputError, naming robot.toml's `path`, where they do not suit the robot.
+    In its order: the arm's axes (A1, A2, …), then external ones (E1, …). Raises InputError, naming
+    robot.toml's `path`, where they do not suit the robot.
     """
     names = joints.names
     order = table.joints or names
@@ -321,21 +321,12 @@ def axes_of(
             f'{path}: [controller] external names "{missing[0]}", which is no joint of the '
             f"robot; it has {', '.join(names)}."
         )
-    signs = table.signs or (1.0,) * len(order)
-    offsets = table.offsets_deg or (0.0,) * len(order)
-    return list(zip(order, signs, offsets, strict=True))
-
-
-def column_names(arm: int, external: int) -> list[str]:
-    """What tables call so many axes of the arm and external ones, without their units."""
-    return [f"{k}{i}" for k, n in (("A", arm), ("E", external)) for i in range(1, n + 1)]
-
-
-def with_axes(table: ControllerTable, joints: JointUnits, path: Path) -> JointUnits:
-    """Joints whose tables may be in the controller's axes too, as `export poses` writes them."""
-    axes = sorted(axes_of(table, joints, path), key=lambda axis: axis[0] in table.external)
-    external = len(table.external)
-    named = zip(axes, column_names(len(axes) - external, external), strict=True)
-    unit = dict(zip(joints.names, joints.units, strict=True))
-    found = {j: AxisColumn(f"{name}_{unit[j]}", s, o) for (j, s, o), name in named}
-    return replace(joints, axes=tuple(found[name] for name in joints.names))
+    signs = dict(zip(order, table.signs or (1.0,) * len(order), strict=True))
+    offsets = dict(zip(order, table.offsets_deg or (0.0,) * len(order), strict=True))
+    units, found = dict(zip(names, joints.units, strict=True)), {}
+    for letter, outside in (("A", False), ("E", True)):
+        group = (name for name in order if (name in table.external) == outside)
+        for number, name in enumerate(group, 1):
+            column = f"{letter}{number}_{units[name]}"
+            found[name] = AxisColumn(column, signs[name], offsets[name])
+    return found

@@ -1,7 +1,7 @@
 """A robot: kinematics and limits from its URDF, the elastic part from robot.toml."""
 
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -16,8 +16,8 @@ from planner.robot.config_file import (
     check_entries,
     check_laws,
     check_own_springs,
+    controller_axes,
     load_config,
-    with_axes,
 )
 from planner.robot.shapes import UnusableShape, leave_out_unusable
 from planner.robot.urdf import build_model, read_urdf
@@ -85,7 +85,8 @@ class Robot:
         model = build_model(text, urdf)
         linkage = Linkage.of(root, tuple(model.names)[1:])
         joints = JointUnits(linkage.leading(linkage.names), linkage.leading(linkage.slides))
-        joints = with_axes(config.controller, joints, robot_toml)
+        axes = controller_axes(config.controller, joints, robot_toml)
+        joints = replace(joints, axes=tuple(axes[name] for name in joints.names))
         ranges = model.lowerPositionLimit, model.upperPositionLimit, model.velocityLimit
         low, high, speed = (np.array(values)[list(linkage.leads)] for values in ranges)
         robot = cls(
