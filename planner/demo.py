@@ -71,8 +71,16 @@ def play(
                 steps.append(_step(report, proposal, time.perf_counter() - started))
                 story.log(*imported, report.measured)
             story.log(campaign.entries[-1], campaign.model)
+    return _answer(campaign, steps, pool, unused, rrd, progress)
+
+
+def _answer(
+    campaign: Campaign, steps: Sequence[dict[str, Any]], pool: Sequence[PoseFiles],
+    unused: Sequence[PoseFiles], rrd: Path, progress: ProgressCallback,
+) -> Done:  # fmt: skip
+    """Judged on the poses of the pool that were not used."""
     truth = _measured_hz(campaign.cell, unused, progress)
-    q = joints.internal([one.joints_deg for one in unused])
+    q = campaign.cell.robot.joints.internal([one.joints_deg for one in unused])
     (ours, simulation, inside), *modes = errors = _errors(campaign, q, truth)
     each = list(zip(*modes, strict=True)) or [(), (), ()]
     keys = {
