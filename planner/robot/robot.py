@@ -168,7 +168,7 @@ class Robot:
         """Numbers of the joint that moves a link and of the one that it carries, if it does."""
         for joint, name in enumerate(self.linkage.names, 1):
             if self.link_of(name) == link:
-                beyond = [k for k in range(1, self.model.njoints) if self.model.parents[k] == joint]
+                beyond = [int(k) for k in self.model.children[joint]]
                 beyond.sort(key=lambda k: k - 1 not in self.linkage.leads)  # balancers come last
                 return (joint, beyond[0]) if beyond else None
         return None
@@ -258,11 +258,8 @@ class Robot:
     @cached_property
     def tool_chain(self) -> tuple[int, ...]:
         """Places in `linkage` of all joints between the base and the tcp, from the tcp."""
-        found, joint = [], self.model.frames[self.tcp_id].parentJoint
-        while joint != 0:
-            found.append(joint - 1)
-            joint = self.model.parents[joint]
-        return tuple(found)
+        chain = list(self.model.supports[self.model.frames[self.tcp_id].parentJoint])
+        return tuple(int(joint) - 1 for joint in reversed(chain) if joint)
 
     @cached_property
     def shoulder_m(self) -> np.ndarray:
