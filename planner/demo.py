@@ -2,8 +2,8 @@
 
 import tempfile
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +20,7 @@ from planner.compare.pool import PoseFiles, make, poses_of
 from planner.dataset.visits import recordings_in
 from planner.errors import InputError, NoPoseLeftError
 from planner.progress import ProgressCallback
-from planner.report.answer import Answer, plain
-from planner.report.rerun.event_logger import EventLogger
+from planner.report.answer import Done
 from planner.report.text import SIMULATED, number, table
 
 NAME = "kr240_plane"
@@ -37,98 +36,12 @@ def shipped(name: str) -> Path:
     raise InputError(f"The shipped campaign {name} is missing; install the package again.")
 
 
-@dataclass(frozen=True, eq=False)
-class DemonstrationStep:
-    """A measurement: the pose, the one proposed next, frequencies of its modes, and times."""
-
-    pose: str
-    proposed: str
-    frequency_hz: tuple[float, ...]
-    refused: int
-    frequency_sd_percent: np.ndarray
-    refit_seconds: float
-    seconds: float
-
-
-@dataclass(frozen=True, eq=False)
-class DemonstrationReport(Answer):
-    """Answer of `demo`, judged on n poses of the pool that were not used: (n, modes) in Hz."""
-
-    campaign: Campaign
-    pool: tuple[PoseFiles, ...]
-    steps: tuple[DemonstrationStep, ...]
-    measured_hz: np.ndarray
-    predicted_hz: np.ndarray
-    predicted_sd_hz: np.ndarray
-    simulated_hz: np.ndarray
-    rrd: Path
-
-    @property
-    def errors(self) -> list[tuple[float, float, float]]:
-        """RMSE of the planner and of the simulation alone (%), share in 95 % intervals.
-
-        Of all modes together, then of each.
-        """
-        truth, far = self.measured_hz, Z_95 * self.predicted_sd_hz
-        inside, found = np.abs(truth - self.predicted_hz) <= far, []
-        for k in (slice(None), *range(truth.shape[1])):
-            known = np.isfinite(truth[:, k])
-            share = float(np.mean(inside[:, k][known])) if known.any() else float("nan")
-            both = (rmse_percent(of[:, k], truth[:, k]) for of in
-                    (self.predicted_hz, self.simulated_hz))  # fmt: skip
-            found.append((*both, share))
-        return found
-
-    def to_json(self) -> dict[str, Any]:
-        """Errors of all modes together, and per mode."""
-        (ours, simulation, inside), *modes = self.errors
-        each = list(zip(*modes, strict=True)) or [(), (), ()]
-        return plain({
-            "campaign": str(self.campaign.directory), "robot": self.campaign.cell.robot.name,
-            "simulated": True, "pool": len(self.pool), "measurements": len(self.steps),
-            "used": [step.pose for step in self.steps], "unused": len(self.measured_hz),
-            "modes_compared": int(np.isfinite(self.measured_hz).sum()),
-            "frequency_rmse_percent": ours, "simulation_rmse_percent": simulation,
-            "frequency_rmse_percent_per_mode": each[0],
-            "simulation_rmse_percent_per_mode": each[1],
-            "coverage95": inside, "coverage95_per_mode": each[2],
-            "remarks": self.campaign.model.remarks,
-            "step_seconds": [step.seconds for step in self.steps], "steps": self.steps,
-            "rrd": str(self.rrd),
-        })  # fmt: skip
-
-    def text(self) -> Group:
-        """The course, and the errors mode by mode."""
-        course = table("Course", "measurement", "pose", "measured (Hz)", "sd of frequencies (%)")
-        for k, step in enumerate(self.steps, 1):
-            hz = "  ".join(f"{f:.2f}" for f in step.frequency_hz)
-            sd = "  ".join(f"{v:.2f}" for v in step.frequency_sd_percent)
-            course.add_row(str(k), step.pose, hz, sd)
-        made = table(
-            f"Demonstration on {self.campaign.cell.robot.name}: {len(self.steps)} of "
-            f"{len(self.pool)} poses",
-            *("mode", "planner RMSE (%)", "simulation alone RMSE (%)", "in 95 % interval (%)"),
-        )
-        every, *modes = self.errors
-        for name, errors in (*enumerate(modes, 1), ("all", every)):
-            *both, inside = errors
-            style = "bold" if name == "all" else None
-            made.add_row(str(name), *map(number, both), f"{100 * inside:.0f}", style=style)
-        first, *later = (step.seconds for step in self.steps)
-        lines = [
-            *self.campaign.model.remarks,
-            f"RMSE is of {len(self.measured_hz)} poses that were never used. Refit and next "
-            f"proposal: first {first:.2f} s, then at most {max(later, default=0.0):.2f} s.",
-            f"Campaign: {self.campaign.directory}",
-            f"Rerun recording: {self.rrd} (open with: rerun FILE)",
-        ]
-        return Group(course, made, Text("\n".join(lines)), SIMULATED)
-
-
 def play(
     directory: Path | None, measurements: int, viewer: bool, progress: ProgressCallback
-) -> DemonstrationReport:
-    """Play a campaign until its target, `measurements`, or the pool's end; returns the summary."""
+) -> Done:
+    """Answer of `demo`: a campaign, played until its target, `measurements`, or the pool's end."""
+    from planner.report.rerun.campaign import RerunView
+
     source = shipped(NAME)
     directory = directory or Path(tempfile.mkdtemp(prefix="planner-demo-")) / NAME
     campaign = Campaign.new(directory, source / "robot" / "robot.toml", source / "campaign.toml")
@@ -136,9 +49,9 @@ def play(
     listed = recordings_in(recordings, joints)
     pool = unused = poses_of(listed, joints, campaign.cell.config.modes)
     rrd = campaign.directory / "demo.rrd"
-    steps: list[DemonstrationStep] = []
+    steps: list[dict[str, Any]] = []
     started = time.perf_counter()
-    with EventLogger(campaign.cell, rrd, viewer, simulated=True) as story:
+    with closing(RerunView(campaign.cell, rrd, viewer, simulated=True)) as story:
         story.log(campaign.entries[0], campaign.model)
         proposal = campaign.next()[0]
         story.log(campaign.entries[-1], campaign.model)
@@ -158,21 +71,84 @@ def play(
                 steps.append(_step(report, proposal, time.perf_counter() - started))
                 story.log(*imported, report.measured)
             story.log(campaign.entries[-1], campaign.model)
-    cell, truth = campaign.cell, _measured_hz(campaign.cell, unused, progress)
-    q = joints.internal([one.joints_deg for one in unused])
-    expected, simulated = campaign.model.predict(q), cell.frozen.simulate(q)
-    predicted = expected.frequency_hz, expected.frequency_sd_hz
-    return DemonstrationReport(
-        campaign, pool, tuple(steps), truth, *predicted, simulated.frequency_hz, rrd
+    return _answer(campaign, steps, pool, unused, rrd, progress)
+
+
+def _answer(
+    campaign: Campaign, steps: Sequence[dict[str, Any]], pool: Sequence[PoseFiles],
+    unused: Sequence[PoseFiles], rrd: Path, progress: ProgressCallback,
+) -> Done:  # fmt: skip
+    """Judged on the poses of the pool that were not used."""
+    truth = _measured_hz(campaign.cell, unused, progress)
+    q = campaign.cell.robot.joints.internal([one.joints_deg for one in unused])
+    (ours, simulation, inside), *modes = errors = _errors(campaign, q, truth)
+    each = list(zip(*modes, strict=True)) or [(), (), ()]
+    keys = {
+        "campaign": str(campaign.directory), "robot": campaign.cell.robot.name, "simulated": True,
+        "pool": len(pool), "measurements": len(steps), "used": [step["pose"] for step in steps],
+        "unused": len(truth), "modes_compared": int(np.isfinite(truth).sum()),
+        "frequency_rmse_percent": ours, "simulation_rmse_percent": simulation,
+        "frequency_rmse_percent_per_mode": each[0], "simulation_rmse_percent_per_mode": each[1],
+        "coverage95": inside, "coverage95_per_mode": each[2], "remarks": campaign.model.remarks,
+        "step_seconds": [step["seconds"] for step in steps], "steps": steps, "rrd": str(rrd),
+    }  # fmt: skip
+    return Done(keys, _said(keys, errors))
+
+
+def _errors(
+    campaign: Campaign, q: np.ndarray, truth: np.ndarray
+) -> list[tuple[float, float, float]]:
+    """RMSE of the planner and of the simulation alone (%), share in 95 % intervals.
+
+    Of all modes together, then of each, at q (n, dof) in rad where `truth` (n, modes) is in Hz.
+    """
+    expected, simulated = campaign.model.predict(q), campaign.cell.frozen.simulate(q).frequency_hz
+    inside = np.abs(truth - expected.frequency_hz) <= Z_95 * expected.frequency_sd_hz
+    found = []
+    for k in (slice(None), *range(truth.shape[1])):
+        known = np.isfinite(truth[:, k])
+        share = float(np.mean(inside[:, k][known])) if known.any() else float("nan")
+        of = (expected.frequency_hz, simulated)
+        ours, alone = (rmse_percent(hz[:, k], truth[:, k]) for hz in of)
+        found.append((ours, alone, share))
+    return found
+
+
+def _said(keys: Mapping[str, Any], errors: Sequence[tuple[float, float, float]]) -> Group:
+    """The course, and the errors mode by mode."""
+    course = table("Course", "measurement", "pose", "measured (Hz)", "sd of frequencies (%)")
+    for k, step in enumerate(keys["steps"], 1):
+        hz, sd = ("  ".join(f"{v:.2f}" for v in step[name])
+                  for name in ("frequency_hz", "frequency_sd_percent"))  # fmt: skip
+        course.add_row(str(k), step["pose"], hz, sd)
+    made = table(
+        f"Demonstration on {keys['robot']}: {keys['measurements']} of {keys['pool']} poses",
+        *("mode", "planner RMSE (%)", "simulation alone RMSE (%)", "in 95 % interval (%)"),
     )
+    every, *modes = errors
+    for name, (*both, inside) in (*enumerate(modes, 1), ("all", every)):
+        style = "bold" if name == "all" else None
+        made.add_row(str(name), *map(number, both), f"{100 * inside:.0f}", style=style)
+    first, *later = keys["step_seconds"]
+    lines = [
+        *keys["remarks"],
+        f"RMSE is of {keys['unused']} poses that were never used. Refit and next "
+        f"proposal: first {first:.2f} s, then at most {max(later, default=0.0):.2f} s.",
+        f"Campaign: {keys['campaign']}",
+        f"Rerun recording: {keys['rrd']} (open with: rerun FILE)",
+    ]
+    return Group(course, made, Text("\n".join(lines)), SIMULATED)
 
 
-def _step(report: ImportReport, proposal: Proposal, seconds: float) -> DemonstrationStep:
+def _step(report: ImportReport, proposal: Proposal, seconds: float) -> dict[str, Any]:
+    """A measurement: the pose, the one proposed next, frequencies of its modes, and times."""
     modes = report.measurement.modes if report.measurement else ()
-    return DemonstrationStep(
-        report.pose, proposal.pose, tuple(m.frequency_hz for m in modes if m.likely),
-        len(report.refused), report.model.frequency_sd_percent, report.refit_seconds, seconds,
-    )  # fmt: skip
+    return {
+        "pose": report.pose, "proposed": proposal.pose,
+        "frequency_hz": tuple(m.frequency_hz for m in modes if m.likely),
+        "refused": len(report.refused), "frequency_sd_percent": report.model.frequency_sd_percent,
+        "refit_seconds": report.refit_seconds, "seconds": seconds,
+    }  # fmt: skip
 
 
 def _nearest(cell: Cell, pool: Sequence[PoseFiles], proposal: Proposal) -> PoseFiles:

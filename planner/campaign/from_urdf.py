@@ -249,10 +249,11 @@ def _part(value: float, percent: float | None) -> float:
 
 def _remarks(robot: Robot, chain: ArmChain, weights: StatedMasses) -> Iterator[str]:
     """What the engineer has to know, and what to put right first."""
-    if chain.others:
+    if chain.held:
+        held = ", ".join(entry.rpartition("_")[0] for entry in chain.held)
         yield (
             f"The arm is the longest chain of moving joints, {chain.joints[0]} to "
-            f"{chain.joints[-1]}; {', '.join(chain.others)} stay where [held] of robot.toml says."
+            f"{chain.joints[-1]}; {held} stay where [held] of robot.toml says."
         )
     first = f'tcp_frame = "{chain.tcp}", where the hammer hits (robot.toml says how to move it)'
     if not weights.tool and not mounted(robot, link_bodies(robot)):

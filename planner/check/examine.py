@@ -66,8 +66,7 @@ class Examination:
 
 def home_of(robot: Robot) -> np.ndarray:
     """Joint angles (dof,) in rad: 0 where the limits allow it, else the middle between them."""
-    middle = (robot.lower_rad + robot.upper_rad) / 2
-    return np.where((robot.lower_rad <= 0) & (robot.upper_rad >= 0), 0.0, middle)
+    return np.where((robot.lower_rad <= 0) & (robot.upper_rad >= 0), 0.0, robot.middle_rad)
 
 
 def examine(robot: Robot, plan: Plan | None = None) -> Examination:

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,42 +9,27 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from planner.proof.score import Place, Scored, Share, by_probability, figures
-from planner.report.answer import Answer, plain
+from planner.report.answer import Done, plain
 from planner.report.pictures import png
 from planner.report.plot_marks import empty, write_values
 
 
-@dataclass(frozen=True)
-class ProofReport(Answer):
-    """Answer of `prove`; `seal` is the hash of all sealed answers, `figures` as in `score`."""
+def write(folder: Path, seal: str, scored: Sequence[Scored]) -> Done:
+    """Answer of `prove`, once all files are in a folder; `seal` is the hash of all sealed answers.
 
-    seal: str
-    cases: int
-    figures: Mapping[str, Any]
-    misses: tuple[Scored, ...]
-    report: str
-
-    def to_json(self) -> dict[str, Any]:
-        """The figures are keys of their own."""
-        found = super().to_json()
-        inner = found.pop("figures")
-        return {"seal": found.pop("seal"), "cases": found.pop("cases"), **inner, **found}
-
-    def text(self) -> str:
-        """The written report."""
-        return Path(self.report).read_text(encoding="utf-8")
-
-
-def write(folder: Path, seal: str, scored: Sequence[Scored]) -> ProofReport:
-    """Write all files into a folder."""
+    Its keys are those of `score.figures`, and "misses".
+    """
     found = figures(scored)
     misses = tuple(s for s in scored if not s.right)
-    answer = ProofReport(seal, len(scored), found, misses, str(folder / "report.md"))
+    own, report = {"seal": seal, "cases": len(scored)}, folder / "report.md"
+    answer = Done(
+        {**own, **found, "misses": misses, "report": str(report)}, _markdown(seal, scored, found)
+    )
     text = json.dumps(answer.to_json() | {"scored": plain(scored)}, indent=1)
     (folder / "report.json").write_text(text, encoding="utf-8")
     for name, draw in {"confusion": confusion, "calibration": calibration}.items():
         (folder / f"{name}.png").write_bytes(png(draw(scored), dpi=110))
-    (folder / "report.md").write_text(_markdown(seal, scored, found), encoding="utf-8")
+    report.write_text(str(answer.said), encoding="utf-8")
     return answer
 
 

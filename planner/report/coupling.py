@@ -1,7 +1,7 @@
 """Answer of `couple`: the FRFs of another tool, how sure they are, and the hit that would tell."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -20,9 +20,6 @@ from planner.milling.tool import NUMBERS
 from planner.report.answer import Done
 from planner.report.pictures import Pictures
 from planner.report.text import ending, remarks, table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def _amplified(coupled: CoupledFrf) -> dict[str, Any]:
@@ -66,7 +63,7 @@ def coupling_report(
     peaks, verify, grown = resonances(coupled), verifying_hit(coupled), _amplified(coupled)
     told = _remarks(coupled, grown["above_limit_hz"])
 
-    def draw() -> "dict[str, Figure]":
+    def draw():
         from planner.report.milling_plots import coupling_figure
 
         said = "as measured" if reference is None else f"measured: {reference}"

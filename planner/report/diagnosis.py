@@ -20,6 +20,7 @@ from planner.fit.posterior import RobotPosterior
 from planner.measurement.agreement import Similarity, fit_similarity
 from planner.report.answer import NOT_IN_JSON, Answer, encoded, plain
 from planner.report.text import command_line, ending, remarks, table
+from planner.robot.config import ParameterTable
 from planner.robot.place_names import place_names, with_names
 from planner.words import listed, probable
 
@@ -39,15 +40,6 @@ VERDICTS = {
 
 
 @dataclass(frozen=True)
-class ParameterValue:
-    """A parameter of an effect with its standard deviation and unit."""
-
-    value: float
-    sd: float
-    unit: str
-
-
-@dataclass(frozen=True)
 class EstablishedEffect:
     """An effect at its place, the probability that it is there, and its parameters by name.
 
@@ -59,7 +51,7 @@ class EstablishedEffect:
     at: str | None
     probability: float
     change_percent: float | None
-    parameters: Mapping[str, ParameterValue]
+    parameters: Mapping[str, ParameterTable]
     text: str
 
 
@@ -78,7 +70,7 @@ def established_effects(
     return tuple(
         EstablishedEffect(
             e.effect, e.at, e.probability, None if e.change is None else 100 * e.change,
-            {name: ParameterValue(*value) for name, value in e.parameters.items()},
+            {name: ParameterTable(*value) for name, value in e.parameters.items()},
             with_names(f"{e.text} (probability {probable(e.probability)}){rest(e)}", names),
         )
         for e in found.findings

@@ -19,9 +19,8 @@ from planner.report.answer import Done
 from planner.report.campaign_plots import frf_pictures, left_out_figure, map_pictures
 from planner.report.html import rendered, write_page
 from planner.report.proposals import standing
-from planner.report.saved_diagnosis import chapter, diagnosis_of
 from planner.report.springs import COLUMNS, NOT_KNOWN
-from planner.report.status import status
+from planner.report.status import chapter, diagnosis_of, status
 from planner.report.text import SIMULATED, number, with_sd
 from planner.robot.link_bodies import guessed_masses
 from planner.words import command, counted, local_time

@@ -3,7 +3,7 @@
 import io
 import re
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -107,9 +107,9 @@ def rendered(figure: "Figure", **options: Any) -> bytes:
     from matplotlib.text import Text
 
     image, missing = _drawn(figure, options)
-    others = _fonts_with(missing)
-    if not others:
+    if not missing:
         return image
+    others = _fonts_with(missing)
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
         text.set_fontfamily([*text.get_fontfamily(), *others])
@@ -133,20 +133,11 @@ def _drawn(figure: "Figure", options: dict[str, Any]) -> tuple[bytes, set[int]]:
     return buffer.getvalue(), missing
 
 
-def _fonts_with(characters: Iterable[int]) -> list[str]:
-    """Fonts that have characters (code points), those that have most of them first."""
+def _fonts_with(characters: set[int]) -> list[str]:
+    """Fonts that have any of these characters (code points), those that have most of them first."""
     from matplotlib.font_manager import fontManager, get_font
 
-    left, found = set(characters), []
-    if not left:
-        return found
     # "Last Resort" has a box for every character.
     fonts = [font for font in fontManager.ttflist if not font.name.startswith("Last Resort")]
-    having = {font.name: left & get_font(font.fname).get_charmap().keys() for font in fonts}
-    while left:
-        best = max(having, key=lambda name: len(having[name] & left))
-        if not having[best] & left:
-            break
-        found.append(best)
-        left -= having[best]
-    return found
+    having = {f.name: len(characters & get_font(f.fname).get_charmap().keys()) for f in fonts}
+    return sorted(filter(having.get, having), key=lambda name: -having[name])

@@ -143,10 +143,8 @@ def _answer(
         "poses": poses, "npz": str(npz.resolve()), "measurements": measurements,
         "remarks": told, "robot": robot,
     }  # fmt: skip
-    alone = robot is not UNSET
-    title = f"After {counted(measurements, 'measured pose')}"
-    if alone:
-        title = f"As {robot} states the robot"
+    alone, title = robot is not UNSET, f"After {counted(measurements, 'measured pose')}"
+    title = f"As {robot} states the robot" if alone else title
     rows = (
         (_title(pose) if k == 0 else "", str(k + 1), *mode.cells)
         for pose in poses

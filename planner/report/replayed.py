@@ -1,6 +1,7 @@
 """Answer of `replay`: each step of the log and whether computing it again gave the same."""
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,15 +33,18 @@ def replayed(
     that would have proposed, and saved. Sds (count,) in % are over the workspace. Raises InputError
     where a recording is missing or changed.
     """
-    from planner.report.rerun.event_logger import EventLogger
+    steps, story = [], None
+    with ExitStack() as stack:
+        if rrd is not None or viewer:
+            from planner.report.rerun.campaign import RerunView
 
-    steps = []
-    simulated = campaign.state.simulated
-    with EventLogger(campaign.cell, rrd, viewer, simulated) as story:
+            story = RerunView(campaign.cell, rrd, viewer, campaign.state.simulated)
+            stack.callback(story.close)
         for step in replay(campaign, until, acquisition):
             last = until or len(campaign.entries)
             progress(f"entry {step.entry.seq}, {step.detail}", step.entry.seq / last)
-            story.log(step.entry, step.model, step.measured)
+            if story is not None:
+                story.log(step.entry, step.model, step.measured)
             steps.append(replace(step, measured=None))  # recordings are large
     if acquisition is not None:
         progress(f"playing {acquisition} on what was measured", 1.0)

@@ -1,6 +1,6 @@
 """Answer of `check`: what a robot's description says, and what looks wrong in it."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -18,9 +18,6 @@ from planner.robot.link_bodies import LinkBody, mounted
 from planner.robot.robot import Robot
 from planner.words import counted, listed
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 COLOURS = {"error": "bold red", "warning": "yellow", "note": "dim"}
 
 
@@ -28,7 +25,7 @@ def robot_check(found: Examination, pictures: Pictures) -> Done:
     """Answer of `check`: what was found, errors first, and whether a campaign can begin ("ok")."""
     robot, poses = found.robot, _poses(found)
 
-    def draw() -> "dict[str, Figure]":
+    def draw():
         from planner.report.robot_picture import robot_figure
 
         return {"robot": robot_figure(robot, found.q[0], found.links)}

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -21,9 +21,6 @@ from planner.report.answer import Done
 from planner.report.pictures import Pictures
 from planner.report.text import ending, number, remarks, table
 from planner.words import significant
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 MOST_ROWS = 24  # of speeds that the text shows
 LOBES_SHARE = 0.2  # of the time, where samples follow
@@ -60,7 +57,7 @@ def stability_of(
         told += [*_how_sure(drawn), *limit_remarks(structure, cut, robust, ~drawn.open(robust))]
         robust = drawn.robust()
 
-    def draw() -> "dict[str, Figure]":
+    def draw():
         from planner.report.milling_plots import lobes_figure
 
         return {"stability": lobes_figure(cut, found, drawn, point)}
@@ -187,7 +184,7 @@ def path_report(
 def _path_figures(
     limits: PathLimits, rpm: float, feed: toolpath_poses.FeedAdvice,
     turn: toolpath_poses.TurnAdvice | None, cut: Cut,
-) -> "dict[str, Figure]":  # fmt: skip
+) -> dict[str, Any]:  # fmt: skip
     from planner.report.milling_plots import path_figure, turns_figure
 
     made = {"path": path_figure(limits, rpm, feed, cut)}

@@ -1,7 +1,7 @@
 """Answer of `stability --map`: what a cut is allowed all over a campaign's workspace."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from rich.console import Group
@@ -19,9 +19,6 @@ from planner.report.answer import Done
 from planner.report.pictures import Pictures
 from planner.report.stability import EVERY, depth_mm
 from planner.report.text import ending, remarks, table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 MOST_SPEEDS = 24  # among which the best for the whole workspace is looked for
 MOST_ROWS = 10
@@ -51,7 +48,7 @@ def map_report(
     told = *cut_source.beyond_the_tip(campaign, cut), *_left_out(left_out, campaign.frequency_lines)
     position_m, features = candidates.position_m[kept], candidates.features[kept]
 
-    def draw() -> "dict[str, Figure]":
+    def draw():
         from planner.report.milling_plots import map_figure
 
         where = position_m, features, campaign.cell.workspace.feature_names, robust

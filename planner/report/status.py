@@ -1,86 +1,61 @@
-"""Answer of `status`: what was measured, what is open, how sure the model is."""
+"""Answer of `status`: what was measured, what is open, how sure the model is; a kept diagnosis."""
 
+import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
-import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.model_status import DecisionStatus, LeftOutValues, found_without, left_out
+from planner.campaign.model_status import DecisionStatus, found_without, left_out
 from planner.campaign.state import Measurement
-from planner.design.stopping import Forecast
+from planner.errors import InputError
 from planner.report.answer import Done
 from planner.report.imports import asked_of
 from planner.report.pictures import Pictures
 from planner.report.proposals import forecast_json, standing, unanswered
-from planner.report.saved_diagnosis import diagnosis_of, read_diagnosis, two_answers
 from planner.report.springs import (
     COLUMNS,
     MASS_COLUMNS,
     NOT_KNOWN,
-    RefittedLink,
     RefittedSpring,
     refitted_masses,
     refitted_springs,
 )
 from planner.report.text import ending, sds_over_workspace, table
-from planner.words import by_reason, counted, local_time, significant
+from planner.words import by_reason, counted, listed, local_time, significant
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from planner.campaign.model import Model
     from planner.campaign.model_comparison import LeftOutModel
     from planner.campaign.state import CampaignState
 
+KEPT = "diagnosis.json"  # as `diagnose --out` writes it
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ModelStatus:
-    """What `status` says of the model; sds (count,) in % are over the workspace, mode by mode."""
 
-    robot: str
-    joint_names: tuple[str, ...]
-    frequency_sd_percent: np.ndarray
-    target_frequency_sd_percent: float
-    done: bool
-    forecast: Forecast
-    remarks: tuple[str, ...]
-    leave_one_out: LeftOutValues
-    decision: DecisionStatus | None = None  # where the campaign is for a cut
-    joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
-    springs: tuple[RefittedSpring, ...] = ()  # none where the simulation does not learn
-    masses: tuple[RefittedLink, ...] = ()  # of links, where the recordings tell them
-    waits_for: str = ""  # what lacks until the target is reached
-    frf_sd_percent: tuple[float, ...] = ()  # of predicted FRFs, and of their common scale
-    not_predicted: str = ""  # modes that every pose shows beside those predicted
+def _of_model(model: "Model") -> dict[str, Any]:
+    """What `status` says of the model; sds (count,) in % are over the workspace, mode by mode.
 
-    @classmethod
-    def of(cls, model: "Model") -> "ModelStatus":
-        """Of a campaign's model."""
-        cell = model.cell
-        return cls(
-            robot=cell.robot.name,
-            joint_names=tuple(cell.robot.joint_names),
-            frequency_sd_percent=model.frequency_sd_percent,
-            target_frequency_sd_percent=cell.config.stop.frequency_sd_percent,
-            done=bool(model.done),
-            forecast=model.forecast,
-            remarks=model.remarks,
-            leave_one_out=left_out(model),
-            decision=DecisionStatus.of(model),
-            joint_units=cell.robot.joints.declared,
-            springs=refitted_springs(model),
-            masses=refitted_masses(model),
-            waits_for=model.waits_for,
-            frf_sd_percent=model.frf_sd_percent,
-            not_predicted=model.not_predicted,
-        )
+    "decision" is there where the campaign is for a cut, "springs" where the simulation learns,
+    "masses" of links where the recordings tell them; "waits_for" lacks until the target is reached;
+    "frf_sd_percent" is of predicted FRFs, and of their common scale; "not_predicted" are modes that
+    every pose shows beside those predicted.
+    """
+    cell = model.cell
+    return {
+        "robot": cell.robot.name, "joint_names": tuple(cell.robot.joint_names),
+        "frequency_sd_percent": model.frequency_sd_percent,
+        "target_frequency_sd_percent": cell.config.stop.frequency_sd_percent,
+        "done": bool(model.done), "forecast": model.forecast, "remarks": model.remarks,
+        "leave_one_out": left_out(model), "decision": DecisionStatus.of(model),
+        "joint_units": cell.robot.joints.declared, "springs": refitted_springs(model),
+        "masses": refitted_masses(model), "waits_for": model.waits_for,
+        "frf_sd_percent": model.frf_sd_percent, "not_predicted": model.not_predicted,
+    }  # fmt: skip
 
 
 def status(
@@ -94,12 +69,12 @@ def status(
     "decision" is there where the campaign is for a cut, `models` where they were compared.
     """
     state, directory = campaign.state, campaign.directory
-    believed = campaign.of_model("status", ModelStatus, ModelStatus.of)
+    believed = campaign.of_model("status", dict, _of_model)
     kept = diagnosis or diagnosis_of(directory)
-    beside = two_answers(believed.springs, read_diagnosis(kept)) if kept else ""
+    beside = two_answers(believed["springs"], read_diagnosis(kept)) if kept else ""
 
-    def draw() -> "dict[str, Figure]":
-        if not believed.leave_one_out.values:
+    def draw():
+        if not believed["leave_one_out"].values:
             return {}
         from planner.report.campaign_plots import left_out_figure
 
@@ -107,10 +82,10 @@ def status(
         return {"leave_one_out": left_out_figure(*found_without(campaign.model), title)}
 
     written = (pictures or Pictures()).write(draw, directory.name, simulated=state.simulated)
-    keys = vars(believed) | {
-        "remarks": (*believed.remarks, *filter(None, (beside,))),
-        "forecast": forecast_json(believed.forecast),
-        "decision": believed.decision or msgspec.UNSET,
+    keys = believed | {
+        "remarks": (*believed["remarks"], *filter(None, (beside,))),
+        "forecast": forecast_json(believed["forecast"]),
+        "decision": believed["decision"] or msgspec.UNSET,
         "campaign": str(directory), "simulated": state.simulated,
         "measurements": [_pose(m, m.pose in state.starred) for m in state.measured],
         "open": [state.proposals[pose] for pose in state.open],
@@ -171,18 +146,18 @@ def _counts(measured: Sequence[Mapping[str, Any]], used: int) -> str:
     return f"{counted(used, 'pose')} measured{more}"
 
 
-def _lines(believed: ModelStatus, keys: Mapping[str, Any]) -> list[str]:
+def _lines(believed: Mapping[str, Any], keys: Mapping[str, Any]) -> list[str]:
     held = ", ".join(h["pose"] for h in keys["held"])
     waiting = f"; hit, and waiting for your answer: {held}" if held else ""
     lines = [
         "open: " + (", ".join(p.pose for p in keys["open"]) or "none") + waiting,
         "skipped: " + (", ".join(s["pose"] for s in keys["skipped"]) or "none"),
-        sds_over_workspace(believed.frequency_sd_percent, believed.target_frequency_sd_percent),
-        standing(believed.forecast, believed.waits_for, believed.not_predicted),
+        sds_over_workspace(keys["frequency_sd_percent"], keys["target_frequency_sd_percent"]),
+        standing(believed["forecast"], keys["waits_for"], keys["not_predicted"]),
         f"log: {counted(keys['log']['entries'], 'entry', 'entries')}",
     ]
-    if believed.frf_sd_percent:
-        whole, scale = map(significant, believed.frf_sd_percent)
+    if keys["frf_sd_percent"]:
+        whole, scale = map(significant, keys["frf_sd_percent"])
         lines.insert(3, f"sd of predicted FRFs over the workspace: {whole} %; {scale} % of it "
                         f"a factor common to all (gains and masses)")  # fmt: skip
     if keys["log"]["torn_bytes"]:
@@ -193,8 +168,8 @@ def _lines(believed: ModelStatus, keys: Mapping[str, Any]) -> list[str]:
             f"program stopped before the import: import again."
         )
     lines += [unanswered(h["question"]["text"]) for h in keys["held"]]
-    lines += [believed.decision.text] if believed.decision else []
-    lines += [*keys["remarks"], *believed.leave_one_out.text]
+    lines += [believed["decision"].text] if believed["decision"] else []
+    lines += [*keys["remarks"], *keys["leave_one_out"].text]
     told = by_reason((r["file"], r["reason"]) for r in keys["refused"])
     return lines + [f"refused {one}" for one in told]
 
@@ -234,4 +209,52 @@ def models_text(rows: "Sequence[LeftOutModel]") -> list[RenderableType]:
 
 def model_beside(campaign: Campaign, found: Mapping[str, Any]) -> str:
     """What to say where the campaign's model and a diagnosis of it, as JSON, give two answers."""
-    return two_answers(campaign.of_model("status", ModelStatus, ModelStatus.of).springs, found)
+    return two_answers(campaign.of_model("status", dict, _of_model)["springs"], found)
+
+
+def diagnosis_of(directory: Path, given: Path | None = None) -> Path | None:
+    """Where the kept diagnosis is: the folder or file that was named, else the campaign's own."""
+    if given is None:
+        own = directory / "diagnosis" / KEPT
+        return own if own.is_file() else None
+    file = given / KEPT if given.is_dir() else given
+    if not file.is_file():
+        raise InputError(f"{file} does not exist; name what planner diagnose --out has written.")
+    return file
+
+
+def read_diagnosis(file: Path) -> dict[str, Any]:
+    """The answer in JSON. Raises InputError where it is none."""
+    try:
+        found = json.loads(file.read_bytes())
+        _ = found["verdict"], found["findings"], found["candidates"]
+    except (ValueError, KeyError, TypeError, OSError):
+        raise InputError(f"{file} is no answer of planner diagnose; name another.") from None
+    return found
+
+
+def two_answers(springs: Sequence[RefittedSpring], found: Mapping[str, Any]) -> str:
+    """Why the campaign's model has other springs than a diagnosis names; "" where it has not.
+
+    `springs` are those of the model, `found` is the diagnosis' answer as JSON.
+    """
+    names = found.get("place_names") or {}
+    # Springs that robot.toml states the model refits, too: they tell nothing apart.
+    said = [one["at"] for one in found["findings"] if one["effect"] != "joint_stiffness"]
+    told = {names.get(at, at) for at in said if at}
+    added = {spring.joint for spring in springs if spring.stated is None} - told
+    if not added or not told:
+        return ""
+    return (
+        f"The campaign's model adds springs at {listed(sorted(added))}, which the diagnosis does "
+        f"not name. The model predicts, and so lets every joint and the floor tilt "
+        f"at once; the diagnosis adds only what the recordings cannot do without, and is what to "
+        f"go by for repairs."
+    )
+
+
+def chapter(file: Path) -> dict[str, Any]:
+    """The answer, and the first four of its pictures."""
+    found = read_diagnosis(file)
+    pictures = [Path(p) for p in found.get("plots", ())[:4]]
+    return found | {"pictures": [p for p in pictures if p.is_file() and p.suffix == ".png"]}

@@ -20,16 +20,13 @@ SENSORS = ("sensor", "accelerometer")  # of that where accelerations are measure
 @dataclass(frozen=True)
 class ArmChain:
     """The arm of a URDF: its joints from the base, the frames at its end where a tool and a sensor
-    are, other joints' places.
-
-    `held` is for robot.toml; `others` are the joints that it names.
+    are, and where other joints stay, as robot.toml's [held] says it.
     """
 
     joints: tuple[str, ...]
     tcp: str
     sensor: str  # the tool's, where no other is named so
     held: dict[str, float]
-    others: tuple[str, ...]
 
 
 def arm_chain(root: ElementTree.Element) -> ArmChain | None:
@@ -51,7 +48,6 @@ def arm_chain(root: ElementTree.Element) -> ArmChain | None:
         tree.tool(path[last]),
         tree.sensor(path[last]),
         dict(_held(j) for j in others),
-        tuple(j.get("name", "") for j in others),
     )
 
 

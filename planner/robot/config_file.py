@@ -1,7 +1,6 @@
 """robot.toml read and checked: what is wrong is said in one sentence."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.recording.joints import AxisColumn, JointUnits
+from planner.recording.points import AXES
 from planner.robot.config import (
     BASE,
     LISTS,
@@ -94,6 +94,7 @@ def _check(config: RobotConfig, path: Path) -> None:
     _check_payloads(config, path)
     _check_links(config, path)
     _check_obstacles(config, path)
+    _check_points(config, path)
     for name in ("hits", "sensor", "readback", "diagnose"):
         check_sds(getattr(config, name), f"{path}: [{name}]")
     _within(f"{path}: [controller] speed_percent", config.controller.speed_percent, most=100)
@@ -230,6 +231,31 @@ def _check_obstacles(config: RobotConfig, path: Path) -> None:
         _finite(f"{entry}: rpy_deg", block.rpy_deg, 1e4, "finite numbers")
 
 
+def _check_points(config: RobotConfig, path: Path) -> None:
+    names = [point.name for point in config.point]
+    nodes = [point.node for point in config.point]
+    for number, point in enumerate(config.point, 1):
+        entry = f"{path}: [[point]] number {number} ({point.name})"
+        if not point.name or point.name.isdigit() or any(c.isspace() for c in point.name):
+            raise InputError(
+                f'{path}: [[point]] number {number} is named "{point.name}"; give it a name '
+                f"without blanks that is no number."
+            )
+        if names.index(point.name) != number - 1:
+            raise InputError(f"{entry} is named like an earlier one; give each a name of its own.")
+        if point.node is not None and nodes.index(point.node) != number - 1:
+            other = names[nodes.index(point.node)]
+            raise InputError(f"{entry} has node {point.node}, which is {other}'s; correct one.")
+        if point.node is not None and point.node < 1:
+            raise InputError(f"{entry} has node {point.node}; give a number above 0.")
+        if not set(point.axes) <= set(AXES) or len(set(point.axes)) < max(len(point.axes), 1):
+            raise InputError(f'{entry} has axes {list(point.axes)}; give some of "x", "y", "z".')
+        if not 0 <= point.mass_kg < 1e3:
+            raise InputError(f"{entry} has mass_kg {point.mass_kg}; give 0 kg or more.")
+        if not all(abs(v) < 1e4 for v in (*point.position_m, *point.rpy_deg)):
+            raise InputError(f"{entry} has a position_m or rpy_deg that is no finite number.")
+
+
 def check_entries(robot: "Robot") -> None:
     """Raise InputError where robot.toml names what there is not, or a joint has no range."""
     for entry, name, number in (
@@ -268,12 +294,13 @@ def check_entries(robot: "Robot") -> None:
         )
 
 
-def axes_of(
+def controller_axes(
     table: ControllerTable, joints: JointUnits, path: Path
-) -> list[tuple[str, float, float]]:
-    """The controller's axes in order: joint of the URDF, sign, offset in degrees (slides: mm).
+) -> dict[str, AxisColumn]:
+    """By joint of the URDF its column in tables that count as the controller does.
 
-    Raises InputError, naming robot.toml's `path`, where they do not suit the robot.
+    In its order: the arm's axes (A1, A2, …), then external ones (E1, …). Raises InputError, naming
+    robot.toml's `path`, where they do not suit the robot.
     """
     names = joints.names
     order = table.joints or names
@@ -294,21 +321,12 @@ def axes_of(
             f'{path}: [controller] external names "{missing[0]}", which is no joint of the '
             f"robot; it has {', '.join(names)}."
         )
-    signs = table.signs or (1.0,) * len(order)
-    offsets = table.offsets_deg or (0.0,) * len(order)
-    return list(zip(order, signs, offsets, strict=True))
-
-
-def column_names(arm: int, external: int) -> list[str]:
-    """What tables call so many axes of the arm and external ones, without their units."""
-    return [f"{k}{i}" for k, n in (("A", arm), ("E", external)) for i in range(1, n + 1)]
-
-
-def with_axes(table: ControllerTable, joints: JointUnits, path: Path) -> JointUnits:
-    """Joints whose tables may be in the controller's axes too, as `export poses` writes them."""
-    axes = sorted(axes_of(table, joints, path), key=lambda axis: axis[0] in table.external)
-    external = len(table.external)
-    named = zip(axes, column_names(len(axes) - external, external), strict=True)
-    unit = dict(zip(joints.names, joints.units, strict=True))
-    found = {j: AxisColumn(f"{name}_{unit[j]}", s, o) for (j, s, o), name in named}
-    return replace(joints, axes=tuple(found[name] for name in joints.names))
+    signs = dict(zip(order, table.signs or (1.0,) * len(order), strict=True))
+    offsets = dict(zip(order, table.offsets_deg or (0.0,) * len(order), strict=True))
+    units, found = dict(zip(names, joints.units, strict=True)), {}
+    for letter, outside in (("A", False), ("E", True)):
+        group = (name for name in order if (name in table.external) == outside)
+        for number, name in enumerate(group, 1):
+            column = f"{letter}{number}_{units[name]}"
+            found[name] = AxisColumn(column, signs[name], offsets[name])
+    return found

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from planner.errors import InputError
 from planner.robot.collision import Collisions
 from planner.robot.config import ControllerTable
-from planner.robot.config_file import axes_of, column_names
+from planner.robot.config_file import controller_axes
 from planner.robot.robot import Robot
 from planner.words import counted
 
@@ -36,16 +36,11 @@ class PoseToDrive:
 
 @dataclass(frozen=True)
 class DrivenPose:
-    """A pose in the controller's axes: those of the arm, and external ones.
-
-    In `units`, "deg" or "mm" of each axis in that order.
-    """
+    """A pose in the controller's `axes`, by their columns in tables: "A1_deg", …, "E1_mm", …"""
 
     name: str  # an identifier
     note: str
-    arm: tuple[float, ...]
-    external: tuple[float, ...]
-    units: tuple[str, ...]
+    axes: dict[str, float]
 
 
 def heading(robot: Robot, simulated: bool) -> tuple[str, ...]:
@@ -79,31 +74,28 @@ def program(
     Raises InputError where the robot's axes do not suit the controller.
     """
     table = robot.config.controller
-    axes = axes_of(table, robot.joints, robot.path)
-    arm = [axis for axis in axes if axis[0] not in table.external]
-    external = [axis for axis in axes if axis[0] in table.external]
+    axes = controller_axes(table, robot.joints, robot.path)
+    arm = [joint for joint in axes if joint not in table.external]
+    external = len(axes) - len(arm)
     if kind == "urscript":
-        _refuse_urscript(robot, [name for name, *_ in arm], len(external))
+        _refuse_urscript(robot, arm, external)
     most = ARM_AXES if kind != "poses" else len(axes)
-    if len(arm) > most or len(external) > EXTERNAL_AXES:
+    if len(arm) > most or external > EXTERNAL_AXES:
         raise InputError(
             f"{robot.path}: {kind} has {ARM_AXES} axes of the arm, the robot {len(arm)}; name the "
             f"others in [controller] external, or export poses."
         )
-    slides = [name for name, *_ in arm if robot.slides(name)]
+    slides = [joint for joint in arm if robot.slides(joint)]
     if kind != "poses" and slides:
         raise InputError(
             f"{robot.path}: joint {slides[0]} slides, and axes of the arm turn in {kind}; name it "
             f"in [controller] external, or export poses."
         )
-    units = tuple("mm" if robot.slides(name) else "deg" for name, *_ in (*arm, *external))
-    used: set[str] = set()
-    driven = []
+    used, driven = set[str](), []
     for pose in poses:
         values = dict(zip(robot.joint_names, pose.joints_deg, strict=True))
-        one = unique(identifier(pose.pose), used)
-        turned = [tuple(s * values[n] + o for n, s, o in group) for group in (arm, external)]
-        driven.append(DrivenPose(one, pose.note, turned[0], turned[1], units))
+        turned = {a.name: a.sign * values[joint] + a.offset for joint, a in axes.items()}
+        driven.append(DrivenPose(unique(identifier(pose.pose), used), pose.note, turned))
     said = heading(robot, simulated)
     return PROGRAMS[kind](identifier(name, "C_"), driven, table, said)
 
@@ -141,8 +133,7 @@ def _krl(
     lines = [f"DEF {name}( )", *(f"; {line}" for line in said), "BAS(#INITMOV, 0)",
              f"BAS(#VEL_PTP, {speed})", f"BAS(#ACC_PTP, {speed})"]  # fmt: skip
     for pose in poses:
-        values = [f"A{k} {v:.4f}" for k, v in enumerate(pose.arm, 1)]
-        values += [f"E{k} {v:.4f}" for k, v in enumerate(pose.external, 1)]
+        values = [f"{axis.partition('_')[0]} {v:.4f}" for axis, v in pose.axes.items()]
         lines += [f"; {pose.note}", f"PTP {{{', '.join(values)}}}", "HALT"]
     return "\r\n".join([*lines, "END", ""])
 
@@ -153,9 +144,10 @@ def _rapid(
     """ABB RAPID: absolute joint moves, stop at each."""
     lines = [f"MODULE {name}", *(f"  ! {line}" for line in said)]
     for pose in poses:
-        arm = [f"{v:.4f}" for v in pose.arm] + ["0"] * (ARM_AXES - len(pose.arm))
-        outer = [f"{v:.4f}" for v in pose.external]
-        outer += [UNUSED] * (EXTERNAL_AXES - len(pose.external))
+        each = pose.axes.items()
+        arm, outer = ([f"{v:.4f}" for axis, v in each if axis[0] == one] for one in "AE")
+        arm += ["0"] * (ARM_AXES - len(arm))
+        outer += [UNUSED] * (EXTERNAL_AXES - len(outer))
         target = f"[[{','.join(arm)}],[{','.join(outer)}]]"
         lines.append(f"  CONST jointtarget {pose.name}:={target};")
     lines += ["  PROC main()", f"    VelSet {table.speed_percent:g},1000;"]
@@ -172,7 +164,7 @@ def _urscript(
     lines = [f"def {name}():", *(f"  # {line}" for line in said)]
     speed = f"{table.speed_percent / 100 * FASTEST_UR_RAD_S:.3f}"
     for pose in poses:
-        values = ", ".join(f"d2r({v:.4f})" for v in pose.arm)
+        values = ", ".join(f"d2r({v:.4f})" for v in pose.axes.values())
         lines += [f"  # {pose.note}", f"  movej([{values}], a=0.5, v={speed})",
                   f'  popup("{pose.note}", title="planner", blocking=True)']  # fmt: skip
     return "\n".join([*lines, "end", ""])
@@ -189,13 +181,9 @@ def _poses(_: str, poses: Sequence[DrivenPose], table: ControllerTable, said: Se
     first = "".join(
         f"{line.partition(':')[0]}; " for line in said if line in (SIMULATED, UNCHECKED, PARTLY)
     )
-    axes: list[str] = []
-    if poses:
-        names = column_names(len(poses[0].arm), len(poses[0].external))
-        axes = [f"{axis}_{unit}" for axis, unit in zip(names, poses[0].units, strict=True)]
-    rows = [",".join(["pose", *axes, "note"])]
+    rows = [",".join(["pose", *(poses[0].axes if poses else ()), "note"])]
     for pose in poses:
-        numbers = [f"{v:.4f}" for v in (*pose.arm, *pose.external)]
+        numbers = [f"{v:.4f}" for v in pose.axes.values()]
         rows.append(",".join([pose.name, *numbers, f'"{first}{pose.note}"']))
     return "\n".join([*rows, ""])
 

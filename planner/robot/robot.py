@@ -1,7 +1,7 @@
 """A robot: kinematics and limits from its URDF, the elastic part from robot.toml."""
 
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -10,21 +10,22 @@ import pinocchio as pin
 
 from planner.errors import InputError
 from planner.recording.joints import JointUnits
-from planner.recording.points import SENSOR, TCP, Layout, PointNames
-from planner.robot.config import Compliance, PointTable, RobotConfig
+from planner.recording.points import AXES, SENSOR, TCP, Layout, PointNames
+from planner.robot.config import Compliance, RobotConfig
 from planner.robot.config_file import (
     check_entries,
     check_laws,
     check_own_springs,
+    controller_axes,
     load_config,
-    with_axes,
 )
-from planner.robot.points import PREFIX, add_points, check_points, is_one_place, names_of
 from planner.robot.shapes import UnusableShape, leave_out_unusable
 from planner.robot.urdf import build_model, read_urdf
-from planner.robot.urdf_elements import Links, links_of, state_inertias
+from planner.robot.urdf_elements import Links, links_of, placed, state_inertias
 from planner.robot.urdf_joints import Linkage
 
+PREFIX = "point "  # of the names of points' frames: a point may be called like a link
+SAME_M, SAME_RAD = 1e-6, 1e-6  # two frames are one: as exactly as files state places
 LEVER_M = 0.3  # half the length of a carriage, chosen
 # A link and the joint that carries it may share a name; the link is meant.
 FRAME_TYPES = (
@@ -84,25 +85,31 @@ class Robot:
         model = build_model(text, urdf)
         linkage = Linkage.of(root, tuple(model.names)[1:])
         joints = JointUnits(linkage.leading(linkage.names), linkage.leading(linkage.slides))
-        joints = with_axes(config.controller, joints, robot_toml)
+        axes = controller_axes(config.controller, joints, robot_toml)
+        joints = replace(joints, axes=tuple(axes[name] for name in joints.names))
         ranges = model.lowerPositionLimit, model.upperPositionLimit, model.velocityLimit
         low, high, speed = (np.array(values)[list(linkage.leads)] for values in ranges)
         robot = cls(
             config, robot_toml, urdf, text, model, linkage, joints, low, high, speed, left_out
         )
-        check_points(config.point, robot_toml)
-        add_points(model, config.point, (robot._link_of_point(p) for p in config.point))
+        robot._add_points()
         check_entries(robot)
         check_own_springs(robot)
         check_laws(robot)
         _ = robot.points
         return robot
 
-    def _link_of_point(self, point: PointTable) -> int:
-        """Number of the frame that a point lies in."""
-        if not point.link and point.name in (TCP, SENSOR):
-            return self.tcp_id if point.name == TCP else self.sensor_id
-        return self.frame_id(f"[[point]] {point.name}: link", point.link)
+    def _add_points(self) -> None:
+        """Frames of the model at the points of robot.toml."""
+        for point in self.config.point:
+            if not point.link and point.name in (TCP, SENSOR):
+                number = self.tcp_id if point.name == TCP else self.sensor_id
+            else:
+                number = self.frame_id(f"[[point]] {point.name}: link", point.link)
+            frame, name = self.model.frames[number], PREFIX + point.name
+            place = frame.placement * placed(point.position_m, point.rpy_deg)
+            added = pin.Frame(name, frame.parentJoint, number, place, pin.FrameType.OP_FRAME)
+            self.model.addFrame(added)
 
     @property
     def links(self) -> Links:
@@ -161,7 +168,7 @@ class Robot:
         """Numbers of the joint that moves a link and of the one that it carries, if it does."""
         for joint, name in enumerate(self.linkage.names, 1):
             if self.link_of(name) == link:
-                beyond = [k for k in range(1, self.model.njoints) if self.model.parents[k] == joint]
+                beyond = [int(k) for k in self.model.children[joint]]
                 beyond.sort(key=lambda k: k - 1 not in self.linkage.leads)  # balancers come last
                 return (joint, beyond[0]) if beyond else None
         return None
@@ -188,19 +195,44 @@ class Robot:
     @property
     def sensor_at_tcp(self) -> bool:
         """Whether the sensor is where the tool is hit, its axes parallel to the tcp's."""
-        return is_one_place(self.model, self.tcp_id, self.sensor_id)
+        return self._is_one_place(self.tcp_id, self.sensor_id)
+
+    def _is_one_place(self, one: int, other: int) -> bool:
+        """Whether two frames, by their numbers, are one."""
+        a, b = self.model.frames[one], self.model.frames[other]
+        off = a.placement.actInv(b.placement)
+        turned = float(np.linalg.norm(pin.log3(off.rotation)))
+        near = float(np.linalg.norm(off.translation)) < SAME_M and turned < SAME_RAD
+        return near and a.parentJoint == b.parentJoint
 
     def place_id(self, entry: str, name: str) -> int:
         """Number of a frame of the URDF, or of a [[point]] that lies in one of its links."""
-        placed = any(p.name == name and p.link for p in self.config.point)
-        point = placed and not any(self.model.existFrame(name, kind) for kind in FRAME_TYPES)
+        point = any(p.name == name and p.link for p in self.config.point)
+        point = point and not any(self.model.existFrame(name, kind) for kind in FRAME_TYPES)
         return self.frame_id(entry, PREFIX + name if point else name)
 
     @cached_property
     def points(self) -> PointNames:
-        """What recordings may call the points of robot.toml, and that they may say nothing."""
-        config = self.config
-        return names_of(self.model, config.point, self.tcp_id, self.sensor_id, self.path)
+        """What recordings may call the points of robot.toml, and that they may say nothing.
+
+        InputError where one is called like the tool's and lies elsewhere.
+        """
+        tools, points = {TCP: self.tcp_id, SENSOR: self.sensor_id}, self.config.point
+        place = {p.name: self.frame_id("[[point]]", PREFIX + p.name) for p in points}
+        for name, there in tools.items():
+            if not self._is_one_place(place.setdefault(name, there), there):
+                raise InputError(
+                    f'{self.path}: [[point]] "{name}" is not where robot.toml\'s {name}_frame is: '
+                    f'state {name}_frame = "{name}" to put that there, or leave out its link and '
+                    f"place."
+                )
+        at_tcp, at_sensor = (
+            tuple(name for name, own in place.items() if self._is_one_place(own, there))
+            for there in tools.values()
+        )
+        axes: dict[str, str] = {p.name: "".join(a for a in AXES if a in p.axes) for p in points}
+        nodes = {str(p.node): p.name for p in points if p.node is not None}
+        return PointNames(axes, nodes, at_tcp, at_sensor)
 
     def layout_ids(self, layout: Layout) -> tuple[list[int], list[int]]:
         """Pinocchio's frame numbers of a layout's hit points and of its sensors."""
@@ -226,11 +258,8 @@ class Robot:
     @cached_property
     def tool_chain(self) -> tuple[int, ...]:
         """Places in `linkage` of all joints between the base and the tcp, from the tcp."""
-        found, joint = [], self.model.frames[self.tcp_id].parentJoint
-        while joint != 0:
-            found.append(joint - 1)
-            joint = self.model.parents[joint]
-        return tuple(found)
+        chain = list(self.model.supports[self.model.frames[self.tcp_id].parentJoint])
+        return tuple(int(joint) - 1 for joint in reversed(chain) if joint)
 
     @cached_property
     def shoulder_m(self) -> np.ndarray:
@@ -275,8 +304,8 @@ class Robot:
     def joint_places(self, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Of each joint of q: place (3,) and axis (3,) in the world at q (dof,)."""
         pin.forwardKinematics(self.model, self._data, self.linkage.at(q))
-        placed = zip(self.joint_axes, self.linkage.leading(list(self._data.oMi)[1:]), strict=True)
-        return [(place.translation.copy(), place.rotation @ axis) for axis, place in placed]
+        places = zip(self.joint_axes, self.linkage.leading(list(self._data.oMi)[1:]), strict=True)
+        return [(place.translation.copy(), place.rotation @ axis) for axis, place in places]
 
     def forward_batch(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rotations (n, 3, 3) and positions (n, 3) of the tcp at q (n, dof)."""

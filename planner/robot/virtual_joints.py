@@ -9,8 +9,7 @@ import pinocchio as pin
 
 from planner.errors import InputError
 from planner.robot.config import BASE, PINOCCHIO, STATED, Payload, symmetric
-from planner.robot.points import PREFIX
-from planner.robot.robot import Robot
+from planner.robot.robot import PREFIX, Robot
 
 SMALL = "resonator"  # and its number: a body of its own too
 BETWEEN = 0.75  # share of a rod's second moment that its halves' centres have

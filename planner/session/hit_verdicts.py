@@ -88,7 +88,6 @@ class Verdicts:
         those of the pose `before`, or like late ones. Hits that contradict others are unsure unless
         their files are said to be right, of `here`. What is late stands beside no other hit.
         """
-        numbers = self.numbered(files, numbers)
         found = [
             (_alone(path, *one, numbers[path, part]), len(parts))
             for path in files for parts in (self._hits_of(path),)

@@ -40,9 +40,8 @@ def arrive(session: Session, state: SessionState) -> SessionState:
     session.rerun_queue.note()
     if state.left:  # what lies there before the robot can have moved
         campaign.show(state.left, session.inbox.present())
-    page = page_without_hits(
-        campaign, proposal, session.hits_at(proposal), session.inbox.folder, state.progress
-    )
+    hits = session.hits_at(proposal)
+    page = page_without_hits(campaign, proposal, hits, session.inbox.folder)
     page = page_with_hits(page, (), (), session.can_take_back, session.auto, state.progress)
     session.screen.show(page.page)
     session.rerun_queue.show()

@@ -208,7 +208,7 @@ def _unfinished(name: str, said: str) -> ScreenText:
 
 
 def page_without_hits(
-    campaign: Campaign, proposal: Proposal, hits_per_pose: int, folder: Path, progress: str
+    campaign: Campaign, proposal: Proposal, hits_per_pose: int, folder: Path
 ) -> PosePage:
     """What the screen says of a pose before anything was hit there."""
     model, robot = campaign.model, campaign.cell.robot
@@ -218,7 +218,7 @@ def page_without_hits(
         proposal, len(model.labelled) + 1, robot.joints, robot.config.tcp_frame,
         max(1, hits_per_pose // len(proposal.hits)), (),
         tuple(expected.frequency_hz[0].tolist()), tuple(expected.frequency_sd_hz[0].tolist()),
-        folder, progress=progress, room=axes_in_the_room(robot, q[0]),
+        folder, room=axes_in_the_room(robot, q[0]),
     )  # fmt: skip
 
 

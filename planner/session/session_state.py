@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.text import Text
@@ -18,7 +19,6 @@ from planner.campaign.state import CampaignState, taken_back
 from planner.campaign.undo import in_short, last_acts, last_undone
 from planner.dataset.measure import MeasuredPose
 from planner.dataset.screened_files import Source, read_one
-from planner.report.rerun.event_logger import EventLogger
 from planner.session import session_text
 from planner.session.diagnosis_process import DiagnosisProcess
 from planner.session.hit_verdicts import BAD, Before, HitVerdict, Part, Verdicts
@@ -26,6 +26,9 @@ from planner.session.inbox import Inbox
 from planner.session.pose_screen import PosePage
 from planner.session.screen import Keys, Screen
 from planner.words import significant
+
+if TYPE_CHECKING:
+    from planner.report.rerun.campaign import RerunView
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,9 +133,9 @@ class SessionState:
 
 
 class RerunQueue:
-    """Keeps each new entry with the model right after it until there is time to show it."""
+    """Keeps each new entry with the model right after it until there is time to tell the story."""
 
-    def __init__(self, campaign: Campaign, story: EventLogger):
+    def __init__(self, campaign: Campaign, story: "RerunView | None"):
         self._campaign, self._story = campaign, story
         self._noted = len(campaign.entries)
         self._waiting: deque[tuple[events.Entry, Model, MeasuredPose | None]] = deque()
@@ -152,7 +155,8 @@ class RerunQueue:
     def show(self) -> None:
         """Show it; what an interruption left over is shown the next time."""
         while self._waiting:
-            self._story.log(*self._waiting[0])
+            if self._story is not None:
+                self._story.log(*self._waiting[0])
             self._waiting.popleft()
 
     def gained(self) -> list[events.Entry]:

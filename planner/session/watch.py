@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.text import Text
@@ -13,7 +14,6 @@ from planner.campaign.campaign import Campaign
 from planner.errors import InputError, PlannerError
 from planner.replay import replay
 from planner.report.answer import Answer
-from planner.report.rerun.event_logger import EventLogger
 from planner.session import session_text
 from planner.session.diagnosis_process import DiagnosisProcess
 from planner.session.hit_verdicts import HitVerdict, Part, Verdicts
@@ -30,6 +30,9 @@ from planner.session.pose_screen import page_with_hits
 from planner.session.screen import Keys, Screen, no_keys, terminal_keys
 from planner.session.session_state import PoseInProgress, RerunQueue, Session, SessionState
 from planner.words import counted, short_name
+
+if TYPE_CHECKING:
+    from planner.report.rerun.campaign import RerunView
 
 AS_PROPOSED = "Angles are taken as proposed, unless recordings.csv beside the hits states others."
 
@@ -72,10 +75,7 @@ def watch(
     with ExitStack() as stack:
         stack.enter_context(campaign.holding())
         source = keys or stack.enter_context(terminal_keys())
-        story = stack.enter_context(EventLogger(campaign.cell, rrd, viewer))
-        if rrd is not None or viewer:  # a resumed session shows what went before, too
-            for step in replay(campaign):
-                story.log(step.entry, step.model, step.measured)
+        story = _story(campaign, rrd, viewer, stack) if rrd is not None or viewer else None
         explaining = DiagnosisProcess(campaign.directory) if explain else None
         if explaining is not None:
             stack.callback(explaining.close)
@@ -90,6 +90,17 @@ def watch(
             auto or source is no_keys, hits_per_pose, explaining, started,
             None if limit_s is None else started + limit_s,
         ))  # fmt: skip
+
+
+def _story(campaign: Campaign, rrd: Path | None, viewer: bool, stack: ExitStack) -> "RerunView":
+    """The Rerun view; of a resumed session it shows what went before, too."""
+    from planner.report.rerun.campaign import RerunView
+
+    story = RerunView(campaign.cell, rrd, viewer)
+    stack.callback(story.close)
+    for step in replay(campaign):
+        story.log(step.entry, step.model, step.measured)
+    return story
 
 
 def _run(session: Session) -> SessionSummary:

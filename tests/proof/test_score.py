@@ -155,7 +155,7 @@ def test_all_files_of_a_report(tmp_path):
     for name in ("confusion.png", "calibration.png"):
         assert (tmp_path / name).stat().st_size > 5000
     assert "| cases with false names | 1/2 | 50%" in found.text()
-    assert [s.name for s in found.misses] == ["b"]
+    assert [s.name for s in found.keys["misses"]] == ["b"]
     kept = json.loads((tmp_path / "report.json").read_text())
     assert kept["nulls_silent"]["of"] == 1
 

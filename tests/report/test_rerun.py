@@ -1,6 +1,7 @@
 """Rerun recordings: figures lie where their numbers say, views show something, robots move."""
 
 import re
+from contextlib import closing
 from itertools import pairwise
 
 import numpy as np
@@ -8,17 +9,15 @@ import pinocchio as pin
 import pytest
 import rerun.blueprint as rrb
 from matplotlib.figure import Figure
-from rerun.chunk import RrdReader
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
 from planner.campaign.events import Proposal
 from planner.replay import replay
 from planner.report.rerun.campaign import RerunView, _blueprint
-from planner.report.rerun.event_logger import EventLogger
 from planner.report.rerun.figures import one_by_one, open_stream, record_figures
 from planner.report.rerun.progress import MeasuredSeries
-from tests.support.rerun_columns import WORLD, Frames, columns_of, lines_of, rotation
+from tests.support.rerun_columns import WORLD, Frames, columns_of, lines_of, rotation, rows_of
 from tests.support.robots import campaign_text, make_arm, urdf
 
 X = np.linspace(1.0, 9.0, 33)
@@ -85,12 +84,11 @@ def views(part):
     return [view for child in part.contents for view in views(child)]
 
 
-def rows_of(rrd):
+def by_entity(rrd):
     """The rows of each entity: (timelines, components)."""
-    reader, rows = RrdReader(rrd), {}
-    for chunk in reader.stream(store=reader.recordings()[0]):
-        for row in chunk.to_record_batch().to_pylist():
-            rows.setdefault(str(chunk.entity_path), []).append(row)
+    rows = {}
+    for entity, row in rows_of(rrd):
+        rows.setdefault(entity, []).append(row)
     return rows
 
 
@@ -98,10 +96,10 @@ def rows_of(rrd):
 def told(named, tmp_path_factory):
     """The campaign, its file, the rows of each entity, and its blueprint."""
     rrd = tmp_path_factory.mktemp("rrd") / "named.rrd"
-    with EventLogger(named.cell, rrd, viewer=False, simulated=True) as story:
+    with closing(RerunView(named.cell, rrd, simulated=True)) as story:
         for step in replay(named):
             story.log(step.entry, step.model, step.measured)
-    return named, rrd, rows_of(rrd), _blueprint(named.cell, "progress/0").root_container
+    return named, rrd, by_entity(rrd), _blueprint(named.cell, "progress/0").root_container
 
 
 def test_every_view_of_every_tab_has_something_to_draw(told):
@@ -158,7 +156,7 @@ def test_what_was_taken_back_is_in_no_series_that_is_shown(tmp_path):
     stream.flush(timeout_sec=10.0)
     stream.disconnect()
     assert shown == ["progress/1"]
-    rows = rows_of(tmp_path / "a.rrd")
+    rows = by_entity(tmp_path / "a.rrd")
     assert not any("mode_2" in entity for entity in rows)
     told = [row for row in rows["/progress/1/learning/mode_1"] if row.get("Scalars:scalars")]
     values = [(row["measurement"], row["Scalars:scalars"][0]) for row in told]

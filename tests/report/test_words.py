@@ -25,8 +25,8 @@ from planner.report.diagnosis import (
 )
 from planner.report.imports import PoseImport
 from planner.report.predictions import ExpectedMode
-from planner.report.saved_diagnosis import two_answers
 from planner.report.springs import RefittedSpring
+from planner.report.status import two_answers
 from planner.report.text import UnbrokenConsole, with_sd
 from planner.robot.place_names import place_names, with_names
 from planner.robot.robot import Robot

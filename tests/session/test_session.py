@@ -17,7 +17,7 @@ from planner.proof.hits import simulate_hit
 from planner.proof.recordings import write_uff
 from planner.recording.folder import TABLE
 from planner.replay import replay
-from planner.report.rerun.event_logger import EventLogger
+from planner.report.rerun.campaign import RerunView
 from planner.session.diagnosis_process import DiagnosisProcess, diagnose_measured
 from planner.session.session_state import RerunQueue
 from tests.support.hit_files import write_hit
@@ -158,18 +158,19 @@ def test_the_question_survives_the_session_and_is_answered_by_a_key(three, sessi
     assert (again.state.refused, again.state.held) == ({}, {})
 
 
-def test_a_table_of_recordings_in_the_folder_gives_the_readback(
+def test_a_table_of_recordings_in_a_subfolder_gives_the_readback(
     cell, first_pose, session, tmp_path
 ):
     campaign, _, inbox = cell
-    shutil.copytree(first_pose.made, inbox, dirs_exist_ok=True)
+    shutil.copytree(first_pose.made, inbox / "left_station" / first_pose.pose)
     rrd = tmp_path / "session.rrd"
     for _ in range(2):  # the second session resumes, and its recording tells it all
         session(campaign, inbox, until="go to pose P002", rrd=rrd)
     drawn = {"/note", "/frf/xx/0/measured", "/cell/measured", "/cell/proposed"}
     assert drawn <= entities_of(rrd)
-    measured = campaign.state.measurements[first_pose.pose].joints_deg
-    assert 0 < np.max(np.abs(np.subtract(measured, first_pose.joints_deg))) <= 0.011
+    (measured,) = campaign.state.used
+    assert 0 < np.max(np.abs(np.subtract(measured.joints_deg, first_pose.joints_deg))) <= 0.011
+    assert {hit.repeat for hit in measured.accepted} == {1, 2, 3}
 
 
 def test_files_that_do_not_say_their_axis_wait_for_the_table(cell, first_pose, session):
@@ -245,13 +246,16 @@ def test_pictures_wait_for_the_next_page_and_are_made_at_the_end_where_interrupt
     told = []
 
     def tell(story, entry, model, measured=None):
+        if not model.labelled:  # what was before the session
+            return
         shown = "Measurement 2: go to pose P002" in session.console.export_text(clear=False)
         told.append((type(entry.event).__name__, len(model.labelled), shown, measured is not None))
         if interrupted and len(told) == 1:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(EventLogger, "log", tell)
-    session(campaign, inbox, until=lambda text: len(told) == 2)
+    monkeypatch.setattr(RerunView, "log", tell)
+    rrd = inbox.parent / "told.rrd"
+    session(campaign, inbox, until=lambda text: len(told) == 2, rrd=rrd)
     assert told[interrupted:] == [("Imported", 1, True, True), ("Proposed", 1, True, False)]
 
 

@@ -3,7 +3,6 @@
 import csv
 import shutil
 
-import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
@@ -37,15 +36,6 @@ def without(folder, unwanted):
         writer = csv.DictWriter(file, kept, extrasaction="ignore")
         writer.writeheader()
         writer.writerows(rows)
-
-
-def test_a_table_in_a_subfolder_gives_the_readback(posed, session):
-    campaign, pose, made, inbox = posed
-    shutil.copytree(made, inbox / "left_station" / pose.pose)
-    session(campaign, inbox, until="go to pose P002")
-    stood = campaign.state.measurements[pose.pose].joints_deg
-    assert 0 < np.max(np.abs(np.subtract(stood, pose.joints_deg))) <= 0.011
-    assert {h.repeat for h in campaign.state.used[0].accepted} == {1, 2, 3}
 
 
 @pytest.mark.parametrize("by", ["session", "import"])

@@ -51,7 +51,7 @@ measured last, slowed down and exaggerated.
 
 
 class RerunView:
-    """Logs a campaign to a file and/or a live viewer (on this machine only)."""
+    """Logs a campaign, event by event, to a file and/or a live viewer (on this machine only)."""
 
     def __init__(self, cell: Cell, rrd: Path | None, viewer: bool = False, simulated: bool = False):
         self._cell = cell
@@ -105,7 +105,7 @@ class RerunView:
         if self._drawing is not None:
             self._drawing.move(q)
 
-    def log(self, entry: events.Entry, model: Model, measured: MeasuredPose | None) -> None:
+    def log(self, entry: events.Entry, model: Model, measured: MeasuredPose | None = None) -> None:
         """Show one event; `model` is that after it."""
         event, number = entry.event, len(model.labelled)
         self._at(number)
