@@ -14,6 +14,7 @@ from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
 from planner.modal.modes import Homogeneity, ModalModel
 from planner.recording.points import SENSOR, TCP
+from planner.recording.read import digest
 from planner.recording.records import FrfRecord, Hit
 
 DEFAULT_BAND_HZ = (4.0, 60.0)  # in which modes of a pose are looked for
@@ -220,8 +221,6 @@ def program() -> str:
 
 def _digest(sources: tuple[Source, ...]) -> str:
     """Of all files' content; a file that cannot be read counts as it is named nowhere else."""
-    from planner.recording.read import digest
-
     contents = []
     for source in sources:
         try:

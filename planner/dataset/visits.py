@@ -94,9 +94,8 @@ def recordings_in(
                     f"{folder / TABLE}, row {row.row}: pose {row.pose} has a joint {off} away from "
                     f"where {where} has it; give another pose another name."
                 )
-            if row.file:
-                q = joints.internal(row.joints_deg)
-                found.append(Recording(row.pose, q, Source.of(row)))
+            q = joints.internal(row.joints_deg)
+            found.append(Recording(row.pose, q, Source.of(row)))
     return tuple(found)
 
 
