@@ -9,11 +9,11 @@ from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.dataset.store import user_store
 from planner.errors import PlannerError, RefusedError, RefusedFile
 from planner.frf.matrix import FrfMatrix, matrix_of, matrix_of_hits
-from planner.recording.geometry import read_geometry
 from planner.recording.points import ANYWHERE
 from planner.recording.read import read
 from planner.recording.records import FrfRecord, Hit, Record, TimeRecord
 from planner.recording.screening import excited_band
+from planner.recording.uff import read_geometry
 
 
 @dataclass(frozen=True, eq=False)

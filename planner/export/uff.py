@@ -12,7 +12,7 @@ import numpy as np
 
 from planner.campaign.events import MeasuredMode
 from planner.frf.synthesis import pole
-from planner.recording.dof import Dof
+from planner.recording.points import Dof
 from planner.recording.records import AXES
 
 HIT, SENSOR = (1, "HIT"), (2, "SENSOR")  # nodes of the tool: numbers and names

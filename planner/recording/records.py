@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.dof import Dof
-from planner.recording.points import NOT_STATED, SENSOR, TCP, Layout, StatedPoints
+from planner.recording.points import NOT_STATED, SENSOR, TCP, Dof, Layout, StatedPoints
 
 AXES = ("x", "y", "z")
 NOTICED = "noticed"  # kind of a fault that is no reason, but what the reader has to say

@@ -22,13 +22,12 @@ from planner.modal.modes import ModalModel
 from planner.modal.operating import operating_modes
 from planner.modal.transfer_functions import modes_from_transfer_functions
 from planner.recording.channel_faults import lost_samples
-from planner.recording.dof import Dof
 from planner.recording.folder import CHANNELS, TABLE, files_in, joint_columns, read_recordings
-from planner.recording.geometry import read_geometry
 from planner.recording.hits import without_unit
-from planner.recording.points import ANYWHERE, PointNames
+from planner.recording.points import ANYWHERE, Dof, PointNames
 from planner.recording.read import READERS, read
 from planner.recording.records import TimeRecord
+from planner.recording.uff import read_geometry
 from planner.report.answer import Done
 from planner.report.modes import mode_keys, modes_answer, named
 from planner.report.pictures import Pictures
