@@ -1,6 +1,7 @@
 """FRFs of any points: exported by an analyser, or estimated here from hits of any points."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -166,8 +167,6 @@ def _band(parts: Sequence[Source]) -> tuple[float, float]:
     """Which the hits excite."""
     hits: list[Hit] = []
     for part in parts:
-        try:
+        with suppress(PlannerError):  # said again, where it is read in earnest
             hits += part.read()[0]
-        except PlannerError:
-            continue  # said again, where it is read in earnest
     return excited_band(hits) if hits else DEFAULT_BAND_HZ

@@ -194,10 +194,8 @@ class MeasuredPose:
         from planner.modal.estimate_modes import estimate_modes
         from planner.modal.homogeneity import homogeneity
 
-        if self.whole is None:
-            return Decomposed(None, None, ())
         if self.frf is None:
-            return Decomposed(None, None, (NOT_OF_TOOL,))
+            return Decomposed(None, None, () if self.whole is None else (NOT_OF_TOOL,))
         try:
             modal = estimate_modes(self.frf, self.band_hz)
         except RefusedError as error:
