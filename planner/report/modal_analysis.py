@@ -90,7 +90,7 @@ def _listed(folder: Path, names: Collection[str] | None = None) -> list[Source]:
     if not text or (names is not None and not any(name in text for name in names)):
         return []
     rows = read_recordings(folder, joint_columns(folder), ANYWHERE, bare=True)
-    told = (Source.of(row) for row in rows if row.file)
+    told = map(Source.of, rows)
     return [replace(s, stated=replace(s.stated, names=PointNames())) for s in told]
 
 
