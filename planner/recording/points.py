@@ -184,8 +184,7 @@ class StatedPoints:
 
         Raises InputError where the file names no point of the robot, or another than the table.
         """
-        stated = (self.hit_point,) if self.hit_point else ()
-        return self.names.hit(self._at(source, node, "hit", stated) or TCP)
+        return self._at(source, node, "hit", (self.hit_point,) if self.hit_point else ())
 
     def knows_response(self, node: str) -> bool:
         """Whether a response at a node is at a point of the robot, or of the table's row."""
@@ -197,18 +196,17 @@ class StatedPoints:
 
     def response_at(self, source: object, node: str) -> str:
         """The same of the point where a response was measured."""
-        own = self._at(source, node, "response", self.response_points)
-        return self.names.sensor(own or SENSOR)
+        return self._at(source, node, "response", self.response_points)
 
     def _at(self, source: object, node: str, what: str, stated: tuple[str, ...]) -> str:
-        """The point that the file names, else the stated one; "" where neither says any."""
+        """The point that the file names, else the stated one, else the tool's."""
         own = self._named(source, node, what, stated)
         if own is None and len(stated) > 1:
             raise InputError(
                 f"{source}{self.where} does not say which of {', '.join(stated)} a response is "
                 f"of; name its node, or its column acceleration_{stated[0]}_x_m_s2."
             )
-        known = self.names.hit if what == "hit" else self.names.sensor
+        known, tool = (self.names.hit, TCP) if what == "hit" else (self.names.sensor, SENSOR)
         if own and stated and known(own) not in map(known, stated):
             where = "was hit" if what == "hit" else "has a response"
             told = own if node == own else f"node {node}, which is {own}"
@@ -216,7 +214,7 @@ class StatedPoints:
                 f"{source}{self.where} {where} at {told}, the table says {', '.join(stated)}; "
                 f"correct the one that is wrong."
             )
-        return own or (stated[0] if stated else "")
+        return known(own or next(iter(stated), tool))
 
     def _named(self, source: object, node: str, what: str, stated: tuple[str, ...]) -> str | None:
         """The point at a node; one that robot.toml does not list is that of a stated point.
