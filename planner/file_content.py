@@ -2,12 +2,31 @@
 
 import hashlib
 from collections import OrderedDict
+from collections.abc import Callable
 from pathlib import Path
+from typing import Generic, TypeVar
 
-Mark = tuple[int, int, int, int]  # number on the disk, size, last write and change (ns)
+Mark = tuple[int, ...]  # number on the disk, size, last write and change (ns)
+T = TypeVar("T")
 
-MOST_BYTES = 64 * 1024 * 1024  # of contents that are remembered; the last one in any case
-_contents: OrderedDict[Path, tuple[Mark, bytes]] = OrderedDict()
+
+class LastRead(Generic[T]):
+    """What was made of the files read last: of so many bytes, of the last one in any case."""
+
+    def __init__(self, most_bytes: int = 64 << 20) -> None:
+        self.most_bytes = most_bytes
+        self._kept: OrderedDict[Path, tuple[Mark, T]] = OrderedDict()
+
+    def of(self, path: Path, now: Mark, make: Callable[[Path], T]) -> T:
+        """As it is remembered, or made anew of a file that has changed: its mark is `now`."""
+        known = self._kept.pop(path, None)
+        self._kept[path] = known if known and known[0] == now else (now, make(path))
+        while len(self._kept) > 1 and sum(m[1] for m, _ in self._kept.values()) > self.most_bytes:
+            self._kept.popitem(last=False)
+        return self._kept[path][1]
+
+
+_contents: LastRead[bytes] = LastRead()
 _hashes: dict[Path, tuple[Mark, str]] = {}
 
 
@@ -19,13 +38,7 @@ def mark(path: Path) -> Mark:
 
 def read(path: Path) -> bytes:
     """A file's bytes. Raises OSError."""
-    now = mark(path)
-    known = _contents.pop(path, None)
-    data = known[1] if known and known[0] == now else path.read_bytes()
-    _contents[path] = now, data
-    while len(_contents) > 1 and sum(len(d) for _, d in _contents.values()) > MOST_BYTES:
-        _contents.popitem(last=False)
-    return data
+    return _contents.of(path, mark(path), Path.read_bytes)
 
 
 def sha256(path: Path) -> str:

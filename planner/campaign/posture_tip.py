@@ -23,9 +23,8 @@ from planner.milling.tool import Tool
 from planner.modal.matrix_modes import modes_of_matrix
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, track
-from planner.recording.dof import Dof
 from planner.recording.folder import TABLE, joint_columns, read_poses, read_recordings
-from planner.recording.points import ANYWHERE
+from planner.recording.points import ANYWHERE, Dof
 from planner.recording.records import AXES
 from planner.surrogate.models.multitask import RANK, fit_multitask
 

@@ -1,6 +1,7 @@
 """FRFs of any points: exported by an analyser, or estimated here from hits of any points."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,11 +10,11 @@ from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.dataset.store import user_store
 from planner.errors import PlannerError, RefusedError, RefusedFile
 from planner.frf.matrix import FrfMatrix, matrix_of, matrix_of_hits
-from planner.recording.geometry import read_geometry
 from planner.recording.points import ANYWHERE
 from planner.recording.read import read
 from planner.recording.records import FrfRecord, Hit, Record, TimeRecord
 from planner.recording.screening import excited_band
+from planner.recording.uff import read_geometry
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,8 +167,6 @@ def _band(parts: Sequence[Source]) -> tuple[float, float]:
     """Which the hits excite."""
     hits: list[Hit] = []
     for part in parts:
-        try:
+        with suppress(PlannerError):  # said again, where it is read in earnest
             hits += part.read()[0]
-        except PlannerError:
-            continue  # said again, where it is read in earnest
     return excited_band(hits) if hits else DEFAULT_BAND_HZ

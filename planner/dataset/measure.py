@@ -14,6 +14,7 @@ from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
 from planner.modal.modes import Homogeneity, ModalModel
 from planner.recording.points import SENSOR, TCP
+from planner.recording.read import digest
 from planner.recording.records import FrfRecord, Hit
 
 DEFAULT_BAND_HZ = (4.0, 60.0)  # in which modes of a pose are looked for
@@ -193,10 +194,8 @@ class MeasuredPose:
         from planner.modal.estimate_modes import estimate_modes
         from planner.modal.homogeneity import homogeneity
 
-        if self.whole is None:
-            return Decomposed(None, None, ())
         if self.frf is None:
-            return Decomposed(None, None, (NOT_OF_TOOL,))
+            return Decomposed(None, None, () if self.whole is None else (NOT_OF_TOOL,))
         try:
             modal = estimate_modes(self.frf, self.band_hz)
         except RefusedError as error:
@@ -220,8 +219,6 @@ def program() -> str:
 
 def _digest(sources: tuple[Source, ...]) -> str:
     """Of all files' content; a file that cannot be read counts as it is named nowhere else."""
-    from planner.recording.read import digest
-
     contents = []
     for source in sources:
         try:

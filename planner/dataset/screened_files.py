@@ -41,7 +41,6 @@ class Source:
     @classmethod
     def of(cls, row: PoseRow) -> "Source":
         """The file that a row of the table names."""
-        assert row.file is not None
         own = row.file, str(row.file), row.hit, row.repeat, row.stated
         return cls(*own, response=row.response, hits=row.hits)
 

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -59,13 +60,12 @@ def table_folders(path: Path) -> tuple[Path, ...]:
     if path.name == TABLE or (path / TABLE).is_file():
         return (path.parent if path.name == TABLE else path,)
     found = (table.parent for table in path.rglob(TABLE) if shown(table, path))
-    return tuple(sorted(found, key=lambda folder: _numbered(folder.relative_to(path))))
 
+    def numbered(folder: Path) -> list[tuple[str, int]]:
+        parts = re.findall(r"(\D*)(\d*)", folder.relative_to(path).as_posix())
+        return [(text, int(digits or 0)) for text, digits in parts]
 
-def _numbered(folder: Path) -> list[tuple[str, int]]:
-    """Of a name each text with the number that follows it."""
-    parts = re.findall(r"(\D*)(\d*)", folder.as_posix())
-    return [(text, int(digits or 0)) for text, digits in parts]
+    return tuple(sorted(found, key=numbered))
 
 
 def recordings_in(
@@ -94,9 +94,8 @@ def recordings_in(
                     f"{folder / TABLE}, row {row.row}: pose {row.pose} has a joint {off} away from "
                     f"where {where} has it; give another pose another name."
                 )
-            if row.file:
-                q = joints.internal(row.joints_deg)
-                found.append(Recording(row.pose, q, Source.of(row)))
+            q = joints.internal(row.joints_deg)
+            found.append(Recording(row.pose, q, Source.of(row)))
     return tuple(found)
 
 
@@ -133,9 +132,7 @@ def _has_recordings(folder: Path) -> bool:
     """Whether one of its first files can be read: pictures' tables and notes cannot."""
     files = sorted(file for file in folder.iterdir() if _may_be_read(file, folder))
     for file in files[:NAMED]:
-        try:
+        with suppress(InputError):
             read(file)
-        except InputError:
-            continue
-        return True
+            return True
     return False

@@ -14,9 +14,9 @@ from planner.campaign.state import Measurement
 from planner.errors import InputError
 from planner.frf.frf import Frf
 from planner.recording.joints import SCALES, JointUnits
+from planner.recording.records import AXES
 from planner.surrogate.frf_bands import ModalPrediction
 
-AXES = "xyz"
 MODES = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd"  # what is said of each
 # Points of a workspace of up to two coordinates, and of more: 3 and 9 s, 0.1 and 0.6 MB.
 FEW_POINTS, MANY_POINTS = 1000, 3000

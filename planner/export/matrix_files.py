@@ -11,11 +11,11 @@ from planner.errors import writing
 from planner.export.uff import Dataset, function, mode_set, write_sets
 from planner.frf.matrix import FrfMatrix
 from planner.modal.matrix_modes import MatrixModes
-from planner.recording.dof import Dof
-from planner.recording.geometry import Geometry
+from planner.recording.points import Dof
+from planner.recording.records import AXES
+from planner.recording.uff import Geometry
 from planner.version import __version__
 
-AXES = ("x", "y", "z")
 MODES = ("mode", "frequency_hz", "frequency_sd_hz", "scatter_hz", "damping_ratio",
          "damping_sd", "mpc", "mpd_deg", "modal_mass_kg", "probability")  # fmt: skip
 VALUES = "mode", "node", "direction", "re", "im", "sd"

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from planner.campaign.events import MeasuredMode
-from planner.recording.dof import Dof
+from planner.frf.synthesis import pole
+from planner.recording.points import Dof
+from planner.recording.records import AXES
 
-AXES = "xyz"
 HIT, SENSOR = (1, "HIT"), (2, "SENSOR")  # nodes of the tool: numbers and names
 FRF, COHERENCE = 4, 6  # function types of dataset 58
 ACCELERANCE = {"ordinate_spec_data_type": 12, "ordinate_axis_lab": "Acceleration",
@@ -99,9 +100,8 @@ def tool_modes(modes: Sequence[MeasuredMode], title: str) -> list[Dataset]:
     """Each mode with its complex eigenvalue and its shape at the sensor's node."""
     sets = []
     for k, mode in enumerate(modes, 1):
-        w, z = 2 * np.pi * mode.frequency_hz, mode.damping_ratio
-        pole = complex(-z * w, w * np.sqrt(max(0.0, 1 - z * z)))
         shape = np.array(mode.shape, dtype=float) @ [1, 1j]
-        said = f"mode {k}: {mode.frequency_hz:.6g} Hz, damping ratio {z:.4g}"
-        sets.append(mode_set(k, pole, (title, said), [SENSOR[0]], shape[None]))
+        said = f"mode {k}: {mode.frequency_hz:.6g} Hz, damping ratio {mode.damping_ratio:.4g}"
+        at = complex(pole(mode.frequency_hz, mode.damping_ratio))
+        sets.append(mode_set(k, at, (title, said), [SENSOR[0]], shape[None]))
     return sets

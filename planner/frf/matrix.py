@@ -12,8 +12,7 @@ import numpy as np
 from planner.errors import PlannerError, RefusedError
 from planner.frf.frf import Frf
 from planner.frf.quantities import DERIVATIVE, convert
-from planner.recording.dof import Dof
-from planner.recording.points import NOT_STATED, SENSOR, TCP, TOOL, Layout
+from planner.recording.points import NOT_STATED, SENSOR, TCP, TOOL, Dof, Layout
 from planner.recording.records import AXES, FrfRecord
 
 # Where an FRF was felt and hit, as nodes ("" where the format knows none) and axes (0, 1, 2), and

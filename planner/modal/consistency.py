@@ -22,8 +22,8 @@ from planner.modal.node_exchange import (
     exchanged_by_neighbours,
     turning_helps,
 )
-from planner.recording.dof import Dof
-from planner.recording.geometry import Geometry
+from planner.recording.points import Dof
+from planner.recording.uff import Geometry
 
 
 @dataclass(frozen=True)

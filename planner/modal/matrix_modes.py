@@ -15,9 +15,9 @@ from planner.modal.modes import UNSCALED, Eigenvectors, Mode
 from planner.modal.motion_fields import expected
 from planner.modal.rank_one_fit import FREE_GAIN, Entries, FittedShape, fit_shape, row_gain
 from planner.modal.residues import realign
-from planner.recording.dof import Dof
-from planner.recording.geometry import Geometry
+from planner.recording.points import Dof
 from planner.recording.screening import FIRST_LINE
+from planner.recording.uff import Geometry
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ import msgspec
 import numpy as np
 
 from planner.frf.synthesis import pole
-from planner.recording.dof import Dof
-from planner.recording.geometry import Geometry
+from planner.recording.points import Dof
+from planner.recording.uff import Geometry
 
 # Less likely poles are not reported as modes.
 LEAST_PROBABILITY = 0.2

@@ -15,8 +15,8 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.recording.dof import DIRECTIONS, Dof
-from planner.recording.geometry import Geometry
+from planner.recording.points import DIRECTIONS, Dof
+from planner.recording.uff import Geometry
 
 # Correlation lengths in spacings of the points, and likewise how far a beam carries on a bed that
 # holds its points and lets them turn.

@@ -15,8 +15,8 @@ from planner.frf.matrix import FrfMatrix
 from planner.modal.estimate_modes import PoleIdentification
 from planner.modal.motion_fields import RowPrediction, predicted_rows
 from planner.modal.residues import realign
-from planner.recording.dof import Dof
-from planner.recording.geometry import Geometry
+from planner.recording.points import Dof
+from planner.recording.uff import Geometry
 
 
 @dataclass(frozen=True, eq=False)

@@ -189,8 +189,7 @@ def lost_samples(record: TimeRecord) -> tuple[Fault, ...]:
     steps = [step(x) for x in after] if candidates.size else []
     for k in candidates.tolist():
         begin, end = int(changes[k]) + 1, int(changes[k + 1])
-        both = zip(after, steps, strict=True)
-        if any(_jumps(x, own, begin, end) for x, own in both):
+        if any(_jumps(x, own, begin, end) for x, own in zip(after, steps, strict=True)):
             rate = record.sampling_rate_hz
             text = (
                 f"{(quiet + begin) / rate:.3g} s into the record all accelerations stand still for "

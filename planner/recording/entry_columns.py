@@ -148,13 +148,13 @@ def _of_structs(values: Sequence[Mapping[str, object]]) -> dict[str, object]:
 class EntryColumn:
     """An array of a file: a column, or one that lacks names (`lacks` says so).
 
-    `own` is stated of it alone, `shared` of several; `title` is its name in a list beside it.
+    `name` is stated of it alone, `title` in a list of several; `stated` is all that is.
     """
 
     path: tuple[str, ...]
     values: np.ndarray  # (n,) unless it lacks something
-    own: Attributes
-    shared: Attributes
+    stated: Attributes
+    name: str = ""
     title: str = ""
     unit: str = ""
     lacks: str = ""
@@ -211,8 +211,9 @@ def _of_one(name: str, beside: Attributes) -> dict[str, object]:
 def _columns(
     at: tuple[str, ...], values: np.ndarray, own: dict[str, object], shared: dict[str, object]
 ) -> Iterator[EntryColumn]:
+    stated, name = {**shared, **own}, name_of(own)
     if values.ndim == 1:
-        yield EntryColumn(at, values, own, shared, unit=unit_of(own))
+        yield EntryColumn(at, values, stated, name, unit=unit_of(own))
         return
     for count, turned in ((values.shape[1], values), (values.shape[0], values.T)):
         for beside in (own, shared):
@@ -220,10 +221,10 @@ def _columns(
                 each = (units_of(of, count) for of in (own, shared))
                 units = next((u for u in each if u[0]), ("",) * count)
                 for title, unit, column in zip(titles, units, turned.T, strict=True):
-                    yield EntryColumn(at, column, own, shared, title, unit)
+                    yield EntryColumn(at, column, stated, name, title, unit)
                 return
     lacks = f"{min(values.shape)} names beside it" if values.ndim == 2 else "one column an FRF"
-    yield EntryColumn(at, values, own, shared, lacks=lacks)
+    yield EntryColumn(at, values, stated, name, lacks=lacks)
 
 
 def _arrays(part: EntryTree | np.ndarray) -> int:
@@ -280,13 +281,10 @@ def named_from(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> Na
     Raises InputError where two have the same, or rates differ, or units are stated twice.
     """
     names = _names(file, columns, by_place)
-    axes = {
-        name: axis_of(file, {**column.shared, **column.own})
-        for name, column in zip(names, columns, strict=True)
-    }
+    axes = {n: axis_of(file, c.stated) for n, c in zip(names, columns, strict=True)}
     attributes = _attributes(columns)
     for column in columns:
-        if said := rescaled({**column.shared, **column.own}):
+        if said := rescaled(column.stated):
             raise InputError(
                 f"{file}: {column.place} is in {column.unit or 'a unit'} and has a {said} beside "
                 f"it, so nothing says what its numbers are in; export it in N or m/s^2."
@@ -334,7 +332,7 @@ def _starts(file: Path, axes: Mapping[str, Axis]) -> tuple[dict[str, float], flo
 
 def _names(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> list[str]:
     """A name for each, by which they differ."""
-    names = [c.title or (not by_place and name_of(c.own)) or c.last for c in columns]
+    names = [c.title or (not by_place and c.name) or c.last for c in columns]
     same = _grouped(names, columns)
     distinct = [
         _differing(column, same[name], columns) if len(same[name]) > 1 else name
@@ -373,21 +371,21 @@ def _differing(
 
 def _common_step(file: Path, steps: Mapping[str, float]) -> float | None:
     """The step that all which state one have; InputError where they contradict."""
+    first, common = next(iter(steps.items()), ("", None))
     for name, step in steps.items():
-        first = next(iter(steps))
         if not abs(step - steps[first]) <= UNEVEN * abs(steps[first]):
             raise InputError(
                 f"{file}: channels {first} and {name} have different rates; export channels that "
                 f"were sampled together."
             )
-    return next(iter(steps.values()), None)
+    return common
 
 
 def _attributes(columns: Sequence[EntryColumn]) -> dict[str, str]:
     """What is stated of all columns, or of some and contradicted of none."""
     found: dict[str, set[str]] = {}
     for column in columns:
-        for key, value in {**column.shared, **column.own}.items():
+        for key, value in column.stated.items():
             if not isinstance(value, tuple) and not is_axis(key):
                 found.setdefault(key.rpartition(".")[2], set()).add(text_of(value))
     return {name: texts.pop() for name, texts in found.items() if len(texts) == 1}

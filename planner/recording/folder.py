@@ -309,7 +309,6 @@ def _one_row_a_file(path: Path, rows: list[PoseRow]) -> tuple[PoseRow, ...]:
     """
     first: dict[Path, PoseRow] = {}
     for row in rows:
-        assert row.file is not None
         assert row.hit is not None
         known = first.setdefault(row.file, row)
         if known is row:

@@ -9,8 +9,7 @@ import numpy as np
 
 from planner.errors import AxisNotStatedError, InputError
 from planner.recording.column_names import hit_direction
-from planner.recording.dof import Dof
-from planner.recording.points import NOT_STATED, SENSOR, StatedPoints
+from planner.recording.points import NOT_STATED, SENSOR, Dof, StatedPoints
 from planner.recording.records import (
     AXES,
     NOTICED,

@@ -1,4 +1,4 @@
-"""Points of a robot where one hits and where sensors sit, as recordings name them.
+"""Where a structure is hit and felt: points as recordings name them, and directions there.
 
 Two points need no name in any file: where the tool is hit ("tcp") and where its sensor sits
 ("sensor"). A recording that names no point is of these.
@@ -12,6 +12,66 @@ from planner.errors import InputError
 TCP, SENSOR = "tcp", "sensor"
 AXES = "xyz"
 NOT_STATED = " (direction not stated)"  # ends the name of a point that a file gives no direction at
+# Directions by their number in universal files: 0 is a scalar, 4 to 6 are rotations.
+DIRECTIONS = ("scalar", "x", "y", "z", "rx", "ry", "rz")
+
+
+@dataclass(frozen=True, order=True)
+class Dof:
+    """A node and a signed direction there: "x", "-x", …, "rz", or "scalar" (no direction).
+
+    `node` is the name of a point or the digits of a node number.
+    """
+
+    node: str
+    direction: str
+
+    def __post_init__(self) -> None:
+        if self.direction.removeprefix("-") not in DIRECTIONS or self.direction == "-scalar":
+            raise InputError(
+                f'Node {self.node}: direction "{self.direction}" is not known; give one of '
+                f"{', '.join(DIRECTIONS[1:])}, with - before it where it points the other way."
+            )
+
+    @classmethod
+    def of_uff(cls, node: int | str, direction: int) -> "Dof":
+        """From the node and the direction number (-6…6) of a universal file."""
+        if abs(direction) >= len(DIRECTIONS):
+            raise InputError(
+                f"Node {node}: direction {direction} is not known; universal files count from -6 "
+                "to 6."
+            )
+        return cls(str(node), ("-" if direction < 0 else "") + DIRECTIONS[abs(direction)])
+
+    @property
+    def number(self) -> int:
+        """The direction's number in universal files, negative where it is turned."""
+        return int(self.sign) * DIRECTIONS.index(self.direction.removeprefix("-"))
+
+    @property
+    def sign(self) -> float:
+        """-1 where the direction points against its axis, else 1."""
+        return -1.0 if self.direction.startswith("-") else 1.0
+
+    @property
+    def positive(self) -> "Dof":
+        """The same place along its axis: what is measured there has to be multiplied by `sign`."""
+        return Dof(self.node, self.direction.removeprefix("-"))
+
+    @property
+    def is_turn(self) -> bool:
+        """Whether it is a rotation about an axis."""
+        return self.direction.removeprefix("-").startswith("r")
+
+    @property
+    def at(self) -> str:
+        """In a sentence: "at node 4, x", "along x" where the node has no name."""
+        if self.node in ("", "0"):
+            return f"along {self.direction}"
+        return f"at node {self.node}, {self.direction}"
+
+    def __str__(self) -> str:
+        return self.direction if self.node in ("", "0") else f"{self.node}:{self.direction}"
 
 
 @dataclass(frozen=True)
@@ -124,8 +184,7 @@ class StatedPoints:
 
         Raises InputError where the file names no point of the robot, or another than the table.
         """
-        stated = (self.hit_point,) if self.hit_point else ()
-        return self.names.hit(self._at(source, node, "hit", stated) or TCP)
+        return self._at(source, node, "hit", (self.hit_point,) if self.hit_point else ())
 
     def knows_response(self, node: str) -> bool:
         """Whether a response at a node is at a point of the robot, or of the table's row."""
@@ -137,18 +196,17 @@ class StatedPoints:
 
     def response_at(self, source: object, node: str) -> str:
         """The same of the point where a response was measured."""
-        own = self._at(source, node, "response", self.response_points)
-        return self.names.sensor(own or SENSOR)
+        return self._at(source, node, "response", self.response_points)
 
     def _at(self, source: object, node: str, what: str, stated: tuple[str, ...]) -> str:
-        """The point that the file names, else the stated one; "" where neither says any."""
+        """The point that the file names, else the stated one, else the tool's."""
         own = self._named(source, node, what, stated)
         if own is None and len(stated) > 1:
             raise InputError(
                 f"{source}{self.where} does not say which of {', '.join(stated)} a response is "
                 f"of; name its node, or its column acceleration_{stated[0]}_x_m_s2."
             )
-        known = self.names.hit if what == "hit" else self.names.sensor
+        known, tool = (self.names.hit, TCP) if what == "hit" else (self.names.sensor, SENSOR)
         if own and stated and known(own) not in map(known, stated):
             where = "was hit" if what == "hit" else "has a response"
             told = own if node == own else f"node {node}, which is {own}"
@@ -156,7 +214,7 @@ class StatedPoints:
                 f"{source}{self.where} {where} at {told}, the table says {', '.join(stated)}; "
                 f"correct the one that is wrong."
             )
-        return own or (stated[0] if stated else "")
+        return known(own or next(iter(stated), tool))
 
     def _named(self, source: object, node: str, what: str, stated: tuple[str, ...]) -> str | None:
         """The point at a node; one that robot.toml does not list is that of a stated point.

@@ -7,11 +7,10 @@ signs may stand before an axis.
 
 import hashlib
 import re
-from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,29 +34,15 @@ from planner.recording.wav import WAV, read_wav, scales_beside, self_contained
 MAX_BYTES = 512 * 1024 * 1024
 
 
-@dataclass(frozen=True, eq=False)
-class ReadFile:
+class ReadFile(NamedTuple):
     """The records of a file as they are, and cut into hits."""
 
     whole: tuple[Record, ...]
     hits: tuple[Record, ...]
 
-    @cached_property
-    def nbytes(self) -> int:
-        """What its numbers take up."""
-        arrays: dict[int, np.ndarray] = {}
-        for record in (*self.whole, *self.hits):
-            if isinstance(record, FrfRecord):
-                own = [record.frequency_hz, record.values, record.coherence]
-            else:
-                own = [channel.samples for channel in record.channels]
-            arrays |= {id(array): array for array in own}
-        return sum(array.nbytes for array in arrays.values())
 
-
-MOST_REMEMBERED = 256 * 1024 * 1024  # bytes of what was read last, the last file in any case
 # A file of many hits is read once, not once a hit.
-_remembered: OrderedDict[tuple[Path, tuple[int, ...]], ReadFile] = OrderedDict()
+_records: file_content.LastRead[ReadFile] = file_content.LastRead(256 << 20)
 
 
 def read_mat(path: Path) -> tuple[Record, ...]:
@@ -190,11 +175,7 @@ def _read(path: Path) -> ReadFile:
         raise InputError(f"{path} is empty; export it again.")
     if size > MAX_BYTES:
         raise InputError(f"{path} is larger than {MAX_BYTES >> 20} MiB; split it.")
-    found = _remembered.pop((path, mark), None) or _read_anew(path)
-    _remembered[path, mark] = found
-    while len(_remembered) > 1 and sum(f.nbytes for f in _remembered.values()) > MOST_REMEMBERED:
-        _remembered.popitem(last=False)
-    return found
+    return _records.of(path, mark, _read_anew)
 
 
 def _read_anew(path: Path) -> ReadFile:

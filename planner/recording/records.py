@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.dof import Dof
-from planner.recording.points import NOT_STATED, SENSOR, TCP, Layout, StatedPoints
+from planner.recording.points import NOT_STATED, SENSOR, TCP, Dof, Layout, StatedPoints
 
 AXES = ("x", "y", "z")
 NOTICED = "noticed"  # kind of a fault that is no reason, but what the reader has to say
@@ -215,7 +214,7 @@ class Hit:
 
 @dataclass(frozen=True)
 class PoseRow:
-    """One row of recordings.csv (`file` is absolute) or of predict.csv (`hit`, `file` None).
+    """One row of recordings.csv (`file` is absolute) or of predict.csv (without `hit`, `file`).
 
     `joints_deg` are degrees, of joints that slide millimetres (`joints.JointUnits`): so it is
     wherever a list of joint values has this name. () where the table has no column of joints.
@@ -226,7 +225,7 @@ class PoseRow:
     row: int  # line in the CSV file, the header being line 1
     hit: str | None = None
     repeat: int | None = None
-    file: Path | None = None
+    file: Path = Path()
     peak_force_n: float | None = None
     response: str | None = None  # signed axis of an FRF's response, where the table says it
     hits: tuple[str, ...] = ()  # of a file with several hits that has a row for each

@@ -1,9 +1,11 @@
-"""Universal files, dataset 58 (ASCII) and 58b (binary): time histories and FRFs."""
+"""Universal files: time histories and FRFs (datasets 58 and 58b), and where points lie."""
 
 import io
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
+from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +33,9 @@ _NONE = ("", "NONE", "NULL")
 _SYSTEMS = {1: (1.0, 1.0), 2: (3.28084, 0.224809), 3: (1.0, 0.101972), 4: (3.28084, 7.23301),
             5: (1e3, 1e3), 6: (1e2, 1e2), 7: (39.3701, 0.224809), 8: (1e3, 0.101972),
             10: (1e3, 1.0)}  # fmt: skip
+# Datasets: nodes (15 and 2411), trace lines (82), units (164).
+NODES, TRACES, UNITS = (15, 2411), 82, 164
+SUFFIXES = (".uff", ".unv", ".uf58", ".txt")
 LAST_LINE = 6  # values: a last line may be filled up
 
 
@@ -266,3 +271,48 @@ def _unit_of_ratio(path: Path, s: dict[str, Any]) -> Unit:
             f"{ratio.quantity}; correct the export."
         )
     return ratio
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """Points by name and what joins them: position_m (n, 3), lines as pairs of names."""
+
+    nodes: tuple[str, ...]
+    position_m: np.ndarray
+    lines: tuple[tuple[str, str], ...] = ()
+
+    def at(self, node: str) -> np.ndarray | None:
+        """Position (3,) of a node, None where it is not known."""
+        return self.position_m[self.nodes.index(node)] if node in self.nodes else None
+
+
+def read_geometry(paths: tuple[Path, ...]) -> Geometry | None:
+    """Nodes and trace lines that universal files hold, the later ones first; None without nodes.
+
+    Lengths are in m where a file states its units (dataset 164), else as they stand.
+    """
+    position: dict[str, np.ndarray] = {}
+    lines: list[tuple[str, str]] = []
+    for path in paths:
+        if path.suffix.lower() in SUFFIXES:
+            found: list[Any] = []  # what cannot be read is left out: it is no measurement
+            with opened(path) as (file, kinds):
+                for index, kind in enumerate(kinds):
+                    if kind in (*NODES, TRACES, UNITS):
+                        with suppress(Exception):
+                            found.append(file.read_sets(index))
+            factors = [float(s.get("length", 1.0)) for s in found if s["type"] == UNITS]
+            # A dataset 164 states how many of the file's lengths make a metre.
+            scale = 1 / factors[-1] if factors and factors[-1] > 0 else 1.0
+            for s in found:
+                if s["type"] in NODES:
+                    places = scale * np.stack([np.asarray(s[axis], float) for axis in "xyz"], 1)
+                    names = (str(int(number)) for number in s["node_nums"])
+                    position |= dict(zip(names, places, strict=True))
+                elif s["type"] == TRACES:
+                    pairs = pairwise(int(n) for n in s["nodes"])  # 0 lifts the pen
+                    lines += [(str(a), str(b)) for a, b in pairs if a and b and a != b]
+    if not position:
+        return None
+    known = tuple(dict.fromkeys(line for line in lines if set(line) <= set(position)))
+    return Geometry(tuple(position), np.array(list(position.values())), known)

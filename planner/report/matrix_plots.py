@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from planner.frf.matrix import FrfMatrix
 from planner.modal.matrix_modes import MatrixModes
 from planner.modal.modes import motions, moved
-from planner.recording.geometry import Geometry
+from planner.recording.uff import Geometry
 from planner.report import modal_plots
 from planner.report.pictures import SIMULATED_TITLE
 from planner.report.plot_marks import MEASURED, MODEL, empty, magnitude, number_modes, panels

@@ -22,13 +22,12 @@ from planner.modal.modes import ModalModel
 from planner.modal.operating import operating_modes
 from planner.modal.transfer_functions import modes_from_transfer_functions
 from planner.recording.channel_faults import lost_samples
-from planner.recording.dof import Dof
 from planner.recording.folder import CHANNELS, TABLE, files_in, joint_columns, read_recordings
-from planner.recording.geometry import read_geometry
 from planner.recording.hits import without_unit
-from planner.recording.points import ANYWHERE, PointNames
+from planner.recording.points import ANYWHERE, Dof, PointNames
 from planner.recording.read import READERS, read
 from planner.recording.records import TimeRecord
+from planner.recording.uff import read_geometry
 from planner.report.answer import Done
 from planner.report.modes import mode_keys, modes_answer, named
 from planner.report.pictures import Pictures
@@ -91,7 +90,7 @@ def _listed(folder: Path, names: Collection[str] | None = None) -> list[Source]:
     if not text or (names is not None and not any(name in text for name in names)):
         return []
     rows = read_recordings(folder, joint_columns(folder), ANYWHERE, bare=True)
-    told = (Source.of(row) for row in rows if row.file)
+    told = map(Source.of, rows)
     return [replace(s, stated=replace(s.stated, names=PointNames())) for s in told]
 
 

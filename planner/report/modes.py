@@ -10,7 +10,7 @@ from rich.text import Text
 
 from planner.campaign.events import MeasuredMode
 from planner.modal.modes import Mode
-from planner.recording.dof import Dof
+from planner.recording.points import Dof
 from planner.report.answer import Done
 from planner.report.pictures import Pictures
 from planner.report.text import ending, remarks, table, with_sd

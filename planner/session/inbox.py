@@ -174,7 +174,7 @@ class FolderTable:
         for path in stamps:
             try:
                 rows = read_recordings(path.parent, self.joints, self.points, bare=True)
-                self._rows |= {row.file: (path.parent, row) for row in rows if row.file is not None}
+                self._rows |= {row.file: (path.parent, row) for row in rows}
                 for row in {row.pose: row for row in reversed(rows) if row.joints_deg}.values():
                     self.check(row.joints_deg, f"{path}, row {row.row}")
             except InputError as error:

@@ -16,8 +16,8 @@ from PIL import Image
 from planner.frf.matrix import FrfMatrix
 from planner.frf.synthesis import pole
 from planner.modal.mac import mac
-from planner.recording.dof import Dof
-from planner.recording.geometry import read_geometry
+from planner.recording.points import Dof
+from planner.recording.uff import read_geometry
 from tests.support.hit_structures import agree, hit_frfs
 from tests.support.matrix_files import transposed, write_matrix
 from tests.support.outside import modes, only_told, told

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError
-from planner.recording.dof import Dof
 from planner.recording.folder import read_recordings
 from planner.recording.hits import hits_from, located
 from planner.recording.named_columns import Named, to_records
-from planner.recording.points import Layout, PointNames, StatedPoints, together
+from planner.recording.points import Dof, Layout, PointNames, StatedPoints, together
 from planner.recording.records import Channel, FrfRecord, TimeRecord
 
 NAMES = PointNames(

@@ -12,7 +12,7 @@ from planner.frf.matrix import FrfMatrix
 from planner.frf.synthesis import pole
 from planner.milling.tip_files import read_tip
 from planner.milling.tool import load_tool
-from planner.recording.dof import Dof
+from planner.recording.points import Dof
 from tests.support.matrix_files import write_matrix
 from tests.support.outside import refused, told
 from tests.support.rerun_columns import lines_of

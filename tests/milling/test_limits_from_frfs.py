@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from planner.frf.matrix import FrfMatrix
-from planner.recording.dof import Dof
+from planner.recording.points import Dof
 from tests.support.matrix_files import write_matrix
 from tests.support.milling_cases import cut_toml, modes_toml
 from tests.support.outside import call

@@ -9,7 +9,7 @@ from planner.modal.consistency import check
 from planner.modal.matrix_modes import modes_of_matrix
 from planner.modal.motion_fields import expected, turned_rows
 from planner.modal.node_exchange import exchanged_nodes
-from planner.recording.geometry import Geometry
+from planner.recording.uff import Geometry
 from tests.support.hit_structures import dof_of, unit_mass_shapes
 from tests.support.rough_hammer_sets import geometry_of, rough_set, spoiled, tellable, told
 from tests.support.structures import plate

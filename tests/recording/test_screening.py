@@ -10,8 +10,8 @@ from planner.dataset.dataset import Dataset, Visit
 from planner.frf.estimator import estimate
 from planner.frf.frf import unreciprocal
 from planner.recording.channel_faults import by_good_sensors
-from planner.recording.dof import Dof
 from planner.recording.force_levels import levels
+from planner.recording.points import Dof
 from planner.recording.records import Hit
 from planner.recording.repeats import doubts, screen_repeats
 from planner.recording.screening import driving_point, screen

@@ -16,8 +16,8 @@ from planner.diagnosis.mismatch import Residuals
 from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes, identification
 from planner.modal.mac import mac
-from planner.recording.dof import Dof
-from planner.recording.geometry import Geometry
+from planner.recording.points import Dof
+from planner.recording.uff import Geometry
 from planner.report.campaign_plots import frf_sheet, left_out_figure
 from planner.report.frf_plots import STYLES, ComparedFrfs, Side, _residuals, frf_map
 from planner.report.matrix_plots import geometry_figure, shapes_figure

@@ -8,7 +8,7 @@ import pytest
 from planner.frf.matrix import FrfMatrix
 from planner.frf.synthesis import accelerance
 from planner.modal.mac import mac
-from planner.recording.dof import Dof
+from planner.recording.points import Dof
 from tests.support.modal_systems import noisy
 from tests.support.structures import Structure
 

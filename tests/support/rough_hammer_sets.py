@@ -16,8 +16,8 @@ from planner.frf.synthesis import accelerance
 from planner.modal.estimate_modes import PoleIdentification
 from planner.modal.mac import mac
 from planner.modal.modes import Mode
-from planner.recording.dof import Dof
-from planner.recording.geometry import Geometry
+from planner.recording.points import Dof
+from planner.recording.uff import Geometry
 from tests.support.hit_structures import dof_of, matrix_of, unit_mass_shapes
 from tests.support.modal_systems import noisy
 from tests.support.structures import Structure, plate

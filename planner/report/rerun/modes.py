@@ -17,8 +17,8 @@ from planner.dataset.measure import MeasuredPose
 from planner.modal.matrix_modes import MatrixModes
 from planner.modal.modes import LARGEST as FARTHEST
 from planner.modal.modes import motions
-from planner.recording.geometry import Geometry
 from planner.recording.points import Layout
+from planner.recording.uff import Geometry
 from planner.report.modal_plots import mac_figure
 from planner.report.rerun.figures import More, draw, figure_view
 from planner.robot.link_bodies import Skeleton, skeleton
