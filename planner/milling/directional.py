@@ -125,7 +125,8 @@ def contact(cut: Cut, depth_m: float, longest_rad: float) -> Engagement:
     ahead = tooth_angles(cut)
     edges = np.array([start, start + lag, end, end + lag])
     breaks = np.mod(edges[None, :] - ahead[:, None] - start, period).ravel()
-    breaks = _distinct(np.append(breaks, [0.0, period]), period)
+    breaks = np.sort(breaks[(breaks > APART) & (period - breaks > APART)])
+    breaks = np.concatenate([[0.0], breaks[np.diff(breaks, prepend=0.0) > APART], [period]])
     found: list[tuple[float, float, tuple[int, ...], int]] = []
     for k, (a, b) in enumerate(pairwise(breaks)):
         tip = np.mod((a + b) / 2 + ahead, 2 * np.pi) + start
@@ -137,14 +138,6 @@ def contact(cut: Cut, depth_m: float, longest_rad: float) -> Engagement:
     first, last, teeth, segment = zip(*found, strict=True)
     arrays = np.array(first), np.array(last), teeth, np.array(segment)
     return Engagement(float(period), start, *arrays)
-
-
-def _distinct(values: np.ndarray, period: float) -> np.ndarray:
-    kept = [0.0]
-    for value in np.sort(values):
-        if value - kept[-1] > APART and period - value > APART:
-            kept.append(float(value))
-    return np.array([*kept, period])
 
 
 def directions(

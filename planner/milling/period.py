@@ -23,14 +23,6 @@ from planner.milling.directional import (
 
 
 @dataclass(frozen=True, eq=False)
-class Discretisation:
-    """How finely the force is resolved: degree of its polynomials, length of an element in rad."""
-
-    degree: int
-    element_rad: float
-
-
-@dataclass(frozen=True, eq=False)
 class Period:
     """Matrices of one period over states z (s,), n chips y, v of this and the last one, m forces.
 
@@ -87,18 +79,17 @@ class _Points:
 
 
 def period(
-    modes: CutterModes,
-    cut: Cut,
-    rpm: float,
-    grid: Discretisation,
-    depth_m: float = 0.0,
+    modes: CutterModes, cut: Cut, rpm: float, degree: int, element_rad: float, depth_m: float
 ) -> Period:
-    """Of modes in the cut's plane at a speed; `depth_m` counts where the cutter has a helix."""
+    """Of modes in the cut's plane at a speed, by polynomials of a degree on elements.
+
+    `element_rad` is the longest element; `depth_m` counts where the cutter has a helix.
+    """
     speed = rpm * 2 * np.pi / 60
-    found = contact(cut, depth_m, grid.element_rad)
-    points = _points(found, cut, speed, grid.degree, depth_m)
-    built = _build(modes, found, points, speed, grid.degree)
-    return built if cut.even else _uneven(built, found, points, cut, grid.degree, depth_m)
+    found = contact(cut, depth_m, element_rad)
+    points = _points(found, cut, speed, degree, depth_m)
+    built = _build(modes, found, points, speed, degree)
+    return built if cut.even else _uneven(built, found, points, cut, degree, depth_m)
 
 
 def _points(found: Engagement, cut: Cut, speed: float, degree: int, depth_m: float) -> _Points:
