@@ -11,7 +11,7 @@ import numpy as np
 
 from planner.errors import PlannerError, RefusedError
 from planner.frf.frf import Frf
-from planner.frf.quantities import DERIVATIVE, convert
+from planner.frf.synthesis import DERIVATIVE, convert
 from planner.recording.dof import Dof
 from planner.recording.points import NOT_STATED, SENSOR, TCP, TOOL, Layout
 from planner.recording.records import AXES, FrfRecord
