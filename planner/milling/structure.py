@@ -145,7 +145,7 @@ def of_frf(frf: CutterFrf, cut: Cut) -> Structure:
     plane, mean = frf.in_plane(cut), mean_matrix(cut)
     if plane.sd is not None:
         check_band(plane, curves(plane.frequency_hz, plane.receptance.transpose(2, 0, 1), mean))
-    fit = CutterFit.of(plane)
+    fit = CutterFit(plane)
     check_structure(fit.modes)
     if plane.sd is None:
         floor = Machine(fit.modes, cut).floor().floor_m

@@ -73,7 +73,7 @@ def check(
     geometry: Geometry | None = None,
 ) -> Consistency:
     """Check FRFs and residues of the modes (indices) that were established."""
-    sides, (low, high) = RovingSides.of(matrix, found, modes), found.data.frequency_hz[[0, -1]]
+    sides, (low, high) = RovingSides(matrix, found, modes), found.data.frequency_hz[[0, -1]]
     lines = (matrix.frequency_hz >= low) & (matrix.frequency_hz <= high)
     driving = tuple(_driving(matrix, sides, lines, *pair) for pair in sides.driving)
     reciprocity = _reciprocity(matrix, found, modes)
@@ -94,7 +94,7 @@ def check(
     elif enough and not turning_helps(sides, turned):
         swapped = exchanged_by_columns(sides) or exchanged_by_neighbours(sides, geometry)
     turned, rows = ((), ()) if swapped else (turned, rows)
-    faults = [swapped.text] if swapped else []
+    faults = [swapped[0]] if swapped else []
     faults += _turned(turned, len(driving), reciprocity)
     done = "hit" if sides.hit else "felt"
     faults += [
@@ -105,7 +105,7 @@ def check(
     single, entries = odd_entries(sides) if enough else ([], [])
     faults += single
     odd = tuple((sides.rows[row], sides.columns[column]) for row, column in entries)
-    untied = tuple(dof for dof in sides.columns if swapped and dof in swapped.dofs)
+    untied = tuple(dof for dof in sides.columns if swapped and dof in swapped[1])
     told = () if faults else _remarks(reciprocity)
     if not driving:
         told = (*told, "No point was hit where it was felt: shapes are not scaled.")
