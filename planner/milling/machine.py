@@ -15,12 +15,14 @@ from planner.milling.period import Period, period
 NOTHING = 1e-60  # 1/m: of an eigenvalue
 
 
-@dataclass(frozen=True, eq=False)
 class LobeCurves:
     """Per line (f,) and eigenvalue λ (f, 2): 1/λ in m, depth of the limit (inf: none), phase."""
 
-    frequency_hz: np.ndarray
-    inverse: np.ndarray
+    def __init__(self, frequency_hz: np.ndarray, receptance: np.ndarray, mean: np.ndarray) -> None:
+        """Of receptances (f, 2, 2) in the cut's plane in m/N, and the mean matrix (2, 2), N/m²."""
+        values = _followed(np.linalg.eigvals(mean @ receptance))
+        # Where nothing gives way in a direction, next to nothing: its depth is beyond all others.
+        self.frequency_hz, self.inverse = frequency_hz, 1 / np.where(values == 0, NOTHING, values)
 
     @property
     def depth_m(self) -> np.ndarray:
@@ -48,14 +50,6 @@ def _depth(inverse: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = np.abs(inverse) ** 2 / (2 * inverse.real)
     return np.where((inverse.real > 0) & np.isfinite(depth), depth, np.inf)
-
-
-def curves(frequency_hz: np.ndarray, receptance: np.ndarray, mean: np.ndarray) -> LobeCurves:
-    """Of receptances (F, 2, 2) in the cut's plane, in m/N, and the mean matrix (2, 2) in N/m²."""
-    values = _followed(np.linalg.eigvals(mean @ receptance))
-    # Where nothing gives way in a direction, next to nothing: its depth is beyond all others.
-    values = np.where(values == 0, NOTHING, values)
-    return LobeCurves(np.asarray(frequency_hz, dtype=float), 1 / values)
 
 
 def _followed(values: np.ndarray) -> np.ndarray:
@@ -154,7 +148,7 @@ class Machine:
         wide = np.geomspace(hertz.min() / 20, hertz.max() * 20, 400)
         lines = np.concatenate([(hertz[:, None] + width[:, None] * near).ravel(), wide])
         lines = np.unique(lines[(lines > wide[0]) & (lines < wide[-1])])
-        return curves(lines, self.modes.receptance(lines), mean_matrix(self.cut))
+        return LobeCurves(lines, self.modes.receptance(lines), mean_matrix(self.cut))
 
 
 SEMI_STEPS, SEMI_PER_RADIAN = 24, 3.0  # of a period, more per radian of the fastest mode: for 1 %
