@@ -115,13 +115,11 @@ def check(
 def _driving(
     matrix: FrfMatrix, sides: RovingSides, lines: np.ndarray, row: int, column: int
 ) -> DrivingPoint:
-    dof = sides.columns[column]
-    imag = np.imag(matrix.accelerance[matrix.index(dof), matrix.references.index(dof), lines])
-    residues = sides.table[row, column]
+    imag, residues = matrix.roved.accelerance[row, column, lines].imag, sides.table[row, column]
     size = np.abs(residues)
     modes = float(np.sum(size[np.real(residues) > 0]) / max(np.sum(size), 1e-300))
     positive = float(np.sum(imag[imag > 0]) / max(np.sum(np.abs(imag)), 1e-300))
-    return DrivingPoint(dof, positive, modes)
+    return DrivingPoint(sides.columns[column], positive, modes)
 
 
 def _reciprocity(
@@ -133,11 +131,8 @@ def _reciprocity(
     height = fit.residue[:, modes] / decay
     noise = 2 * found.scale[modes] * fit.residue_variance[:, modes] / decay**2
     entry = {pair: e for e, pair in enumerate(zip(*found.data.places, strict=True))}
-    both = [
-        (d, matrix.index(d), i) for i, d in enumerate(matrix.references) if d in matrix.responses
-    ]
     out = []
-    for (dof, o, i), (dof_too, o_too, i_too) in combinations(both, 2):
+    for (o, i), (o_too, i_too) in combinations(matrix.both, 2):
         # Response at the second point to a hit at the first, and the other way round
         e, other = entry.get((o_too, i)), entry.get((o, i_too))
         if e is None or other is None:
@@ -147,7 +142,8 @@ def _reciprocity(
         ratio = float(np.real(np.vdot(one, two)) / max(np.linalg.norm(one) ** 2, 1e-300))
         beyond = np.linalg.norm(one - two) ** 2 - np.sum(noise[e] + noise[other])
         apart = float(np.sqrt(max(beyond, 0.0) / max(size, 1e-300)))
-        out.append(Reciprocity(dof_too, dof, apart, ratio))
+        points = matrix.references[i_too], matrix.references[i]
+        out.append(Reciprocity(*points, apart, ratio))
     return tuple(out)
 
 
