@@ -26,16 +26,19 @@ from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 
 
-@dataclass(frozen=True)
 class DrivingPoint:
     """A point hit where it was felt; shares in [0, 1].
 
     `positive` is the share of |Im H| that has the right sign, `modes` that of the modes' residues.
     """
 
-    dof: Dof
-    positive: float
-    modes: float
+    def __init__(
+        self, matrix: FrfMatrix, sides: RovingSides, lines: np.ndarray, row: int, column: int
+    ) -> None:
+        imag, residues = matrix.roved.accelerance[row, column, lines].imag, sides.table[row, column]
+        size, self.dof = np.abs(residues), sides.columns[column]
+        self.positive = float(np.sum(imag[imag > 0]) / max(np.sum(np.abs(imag)), 1e-300))
+        self.modes = float(np.sum(size[np.real(residues) > 0]) / max(np.sum(size), 1e-300))
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ def check(
     """Check FRFs and residues of the modes (indices) that were established."""
     sides, (low, high) = RovingSides(matrix, found, modes), found.data.frequency_hz[[0, -1]]
     lines = (matrix.frequency_hz >= low) & (matrix.frequency_hz <= high)
-    driving = tuple(_driving(matrix, sides, lines, *pair) for pair in sides.driving)
+    driving = tuple(DrivingPoint(matrix, sides, lines, *pair) for pair in sides.driving)
     reciprocity = _reciprocity(matrix, found, modes)
     # Least modes that tell of signs and places
     enough = modes.size >= 3
@@ -110,16 +113,6 @@ def check(
     if not driving:
         told = (*told, "No point was hit where it was felt: shapes are not scaled.")
     return Consistency(driving, tuple(faults), told, turned, rows, untied, odd)
-
-
-def _driving(
-    matrix: FrfMatrix, sides: RovingSides, lines: np.ndarray, row: int, column: int
-) -> DrivingPoint:
-    imag, residues = matrix.roved.accelerance[row, column, lines].imag, sides.table[row, column]
-    size = np.abs(residues)
-    modes = float(np.sum(size[np.real(residues) > 0]) / max(np.sum(size), 1e-300))
-    positive = float(np.sum(imag[imag > 0]) / max(np.sum(np.abs(imag)), 1e-300))
-    return DrivingPoint(sides.columns[column], positive, modes)
 
 
 def _reciprocity(
