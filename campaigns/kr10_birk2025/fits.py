@@ -198,7 +198,7 @@ def _agreement(hits: PathHits, simulation: Simulation, band_hz: tuple[float, flo
         seen = frf.within(band_hz)
         simulated = simulation.accelerance(q[None], seen.frequency_hz)
         parts.append(metrics.agreement(seen.accelerance[None], simulated))
-    return metrics.stack(parts)
+    return Agreement.joined(parts)
 
 
 def percent(agreement: Agreement) -> tuple[float, float]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from planner.errors import PlannerError, RefusedError
 from planner.frf.frf import Frf
-from planner.frf.quantities import DERIVATIVE, convert
+from planner.frf.synthesis import DERIVATIVE, convert
 from planner.recording.points import NOT_STATED, SENSOR, TCP, TOOL, Dof, Layout
 from planner.recording.records import AXES, FrfRecord
 
@@ -154,10 +154,15 @@ class FrfMatrix:
         return int(np.count_nonzero(self.measured))
 
     @property
+    def both(self) -> list[tuple[int, int]]:
+        """(response, reference) of the points that were felt and hit."""
+        felt = {dof: o for o, dof in enumerate(self.responses)}
+        return [(felt[dof], i) for i, dof in enumerate(self.references) if dof in felt]
+
+    @property
     def driving(self) -> tuple[tuple[int, int], ...]:
         """(response, reference) of the driving points: entries hit where they were felt."""
-        found = ((self.index(d), i) for i, d in enumerate(self.references) if d in self.responses)
-        return tuple(pair for pair in found if self.measured[pair])
+        return tuple(pair for pair in self.both if self.measured[pair])
 
     @property
     def hit(self) -> bool:
@@ -173,10 +178,6 @@ class FrfMatrix:
             self, responses=self.references, references=self.responses,
             accelerance=np.swapaxes(self.accelerance, 0, 1), ended=self.ended and self.ended.roved,
         )  # fmt: skip
-
-    def index(self, dof: Dof) -> int:
-        """Which response a degree of freedom is."""
-        return self.responses.index(dof)
 
 
 # Where an FRF was felt and hit, along which signed directions, and its values (F,).

@@ -8,10 +8,11 @@ cross FRFs that vanish by symmetry hold noise alone, on which every model, the t
 fails.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from planner.inference.per_pose import PerPose
 
 
 def frac(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
@@ -41,20 +42,16 @@ def complex_frac(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Agreement:
+class Agreement(PerPose):
     """Agreement of n poses in one band, per pose and direction: all (n, response, hit).
 
     `frac` is in [0, 1]; `error` and `size` (m/s²/N) are the Euclidean norms over lines of
-    |H_meas| − |H_sim| and of |H_meas|. `agreement[poses]` is that of some poses (one path, one
-    pose): an index array, a mask or a slice.
+    |H_meas| − |H_sim| and of |H_meas|. Poses may have frequency lines of their own.
     """
 
     frac: np.ndarray
     error: np.ndarray
     size: np.ndarray
-
-    def __getitem__(self, poses: np.ndarray | slice) -> "Agreement":
-        return Agreement(*(part[poses] for part in (self.frac, self.error, self.size)))
 
     @property
     def global_frac(self) -> np.ndarray:
@@ -83,12 +80,6 @@ def agreement(measured: np.ndarray, simulated: np.ndarray) -> Agreement:
     """
     a, b = np.broadcast_arrays(np.abs(measured), np.abs(simulated))
     return Agreement(frac(measured, simulated), unit_and_length(a - b)[1], unit_and_length(a)[1])
-
-
-def stack(parts: Sequence[Agreement]) -> Agreement:
-    """All poses of several agreements: how poses with frequency lines of their own are joined."""
-    columns = zip(*((p.frac, p.error, p.size) for p in parts), strict=True)
-    return Agreement(*(np.concatenate(column) for column in columns))
 
 
 def direct_mean(values: np.ndarray) -> float:

@@ -11,32 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.errors import RefusedError
-from planner.recording.points import TOOL, Layout
 from planner.recording.records import Hit
 from planner.recording.sampling import same_rate
 
 LEAST_QUIET = 8  # samples before the pulse that tell offset and noise
 FADED = 1e-3  # of the noise that a window leaves: fainter noise is the digits' own
-
-
-@dataclass(frozen=True, eq=False)
-class HitSpectra:
-    """Transforms of one hit: force (F,) in N and responses (r, F) in m/s², summed over samples.
-
-    They are along the `rows` of `layout`. `force_noise` and `noise` (r,) are the powers of the
-    noise in them; `noise_known` is False where nothing was recorded before the pulse and `noise` is
-    no more than a bound.
-    """
-
-    axis: int
-    force: np.ndarray
-    response: np.ndarray
-    force_noise: float
-    force_window_s: float
-    noise: np.ndarray
-    noise_known: bool
-    layout: Layout = TOOL
-    rows: tuple[int, ...] = (0, 1, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +27,7 @@ class Spectra:
     """
 
     frequency_hz: np.ndarray
-    hits: tuple[HitSpectra, ...]
+    hits: tuple["HitSpectra", ...]
     tail_s: float
     peak_s: float
     exponential_rate_1_s: float
@@ -100,47 +79,51 @@ def transform(
     # Nyquist share: beyond it anti-alias filters act
     chosen = (frequency > 0) & (frequency <= min(1.3 * band_hz[1], 0.45 * rate))
     rates = laid_1_s, carried_1_s
-    found = tuple(_transform(hit, before, after, length, chosen, *rates) for hit in hits)
+    found = tuple(HitSpectra(hit, before, after, length, chosen, *rates) for hit in hits)
     tail = float(np.mean([_tail(hit, before, after) for hit in hits]))
     return Spectra(frequency[chosen], found, tail, before / rate, sum(rates), remarks)
 
 
-def _transform(
-    hit: Hit, before: int, after: int, length: int, chosen: np.ndarray, laid_1_s: float,
-    carried_1_s: float,
-) -> HitSpectra:  # fmt: skip
-    pulse, samples = hit.pulse, len(hit.force_n)
-    start = pulse.peak - before
-    used = slice(start, pulse.peak + after)
-    t = (np.arange(samples) - pulse.peak) / hit.sampling_rate_hz
-    laid = np.exp(-laid_1_s * t)
-    # The window that the records carry has made the noise after the pulse smaller than it was.
-    carried = np.exp(-carried_1_s * np.maximum(t, 0))
-    known = pulse.quiet - start >= LEAST_QUIET
-    quiet = slice(start, pulse.quiet)
-    force, response = hit.force_n - pulse.offset_n, hit.acceleration_m_s2
-    if known:
-        force = force - np.mean(force[quiet])
-        response = response - np.mean(response[:, quiet], axis=1, keepdims=True)
-    # Last samples of a record: they bound its noise where nothing was recorded before the pulse
-    noise = np.var(response[:, quiet] if known else response[:, -64:], axis=1, ddof=1)
-    first, end = pulse.around(samples)
-    near = np.zeros(samples)
-    near[max(first, start) : end] = 1.0
-    aside = (force / np.maximum(carried, FADED))[(near == 0) & (carried > FADED)]
-    force_noise = float(np.var(aside, ddof=1)) if aside.size >= LEAST_QUIET else 0.0
-    window = near * laid
-    return HitSpectra(
-        hit.axis_index,
-        np.fft.rfft((hit.sign * force * window)[used], length)[chosen],
-        np.fft.rfft((response * laid)[:, used], length, axis=1)[:, chosen],
-        force_noise * float(np.sum(window**2)),
-        float(np.sum(near)) / hit.sampling_rate_hz,
-        noise * float(np.sum((laid * carried)[used] ** 2)),
-        known,
-        hit.layout,
-        tuple(hit.rows),
-    )
+class HitSpectra:
+    """Transforms of one hit: force (F,) in N and responses (r, F) in m/s², summed over samples.
+
+    They are along the `rows` of `layout`. `force_noise` and `noise` (r,) are the powers of the
+    noise in them; `noise_known` is False where nothing was recorded before the pulse and `noise` is
+    no more than a bound.
+    """
+
+    def __init__(
+        self, hit: Hit, before: int, after: int, length: int, chosen: np.ndarray, laid_1_s: float,
+        carried_1_s: float,
+    ) -> None:  # fmt: skip
+        self.axis, self.layout, self.rows = hit.axis_index, hit.layout, tuple(hit.rows)
+        pulse, samples = hit.pulse, len(hit.force_n)
+        start = pulse.peak - before
+        used = slice(start, pulse.peak + after)
+        t = (np.arange(samples) - pulse.peak) / hit.sampling_rate_hz
+        laid = np.exp(-laid_1_s * t)
+        # The window that the records carry has made the noise after the pulse smaller than it was.
+        carried = np.exp(-carried_1_s * np.maximum(t, 0))
+        self.noise_known = pulse.quiet - start >= LEAST_QUIET
+        quiet = slice(start, pulse.quiet)
+        force, response = hit.force_n - pulse.offset_n, hit.acceleration_m_s2
+        if self.noise_known:
+            force = force - np.mean(force[quiet])
+            response = response - np.mean(response[:, quiet], axis=1, keepdims=True)
+        # Last samples of a record: they bound its noise where nothing was recorded before the pulse
+        still = response[:, quiet] if self.noise_known else response[:, -64:]
+        power = float(np.sum((laid * carried)[used] ** 2))
+        self.noise = np.var(still, axis=1, ddof=1) * power
+        first, end = pulse.around(samples)
+        near = np.zeros(samples)
+        near[max(first, start) : end] = 1.0
+        self.force_window_s = float(np.sum(near)) / hit.sampling_rate_hz
+        aside = (force / np.maximum(carried, FADED))[(near == 0) & (carried > FADED)]
+        force_noise = float(np.var(aside, ddof=1)) if aside.size >= LEAST_QUIET else 0.0
+        window = near * laid
+        self.force_noise = force_noise * float(np.sum(window**2))
+        self.force = np.fft.rfft((hit.sign * force * window)[used], length)[chosen]
+        self.response = np.fft.rfft((response * laid)[:, used], length, axis=1)[:, chosen]
 
 
 def _tail(hit: Hit, before: int, after: int) -> float:

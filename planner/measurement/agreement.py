@@ -59,5 +59,5 @@ def similarity_of(measured: Measured, h: np.ndarray) -> Similarity:
     for i, used in enumerate(measured.used):
         lines = used.any(axis=(0, 1))
         parts.append(metrics.agreement(given[i : i + 1, ..., lines], h[i : i + 1, ..., lines]))
-    whole = metrics.stack(parts)
+    whole = metrics.Agreement.joined(parts)
     return Similarity(metrics.direct_mean(whole.global_frac), metrics.direct_mean(whole.frobenius))

@@ -15,6 +15,7 @@ from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import Poles
 from planner.errors import InputError
 from planner.frf.frf import Frf
+from planner.frf.metrics import mean_known
 from planner.recording.points import TOOL, Layout, together
 from planner.robot.elastic_model import ElasticModel, Matrices
 from planner.robot.robot import Robot
@@ -162,11 +163,8 @@ def noise_sd(frf: Frf) -> np.ndarray:
 
 def _rms(size: np.ndarray) -> np.ndarray:
     """Of each sensor's axes and all lines, column by column, (r, c, 1) of (r, c, F)."""
-    by_sensor = size.reshape(-1, 3, *size.shape[1:])
-    count = np.isfinite(by_sensor).sum(axis=(1, 3), keepdims=True)
-    power = np.nansum(by_sensor**2, axis=(1, 3), keepdims=True)
-    rms = np.sqrt(power / np.maximum(count, 1))
-    return np.broadcast_to(rms, (*by_sensor.shape[:3], 1)).reshape(*size.shape[:2], 1)
+    power = mean_known(size.reshape(-1, 3, *size.shape[1:]) ** 2, axis=(1, 3))
+    return np.repeat(np.sqrt(power), 3, axis=0)[..., None]
 
 
 OVER = -12.0  # Re λ T below which a decay is over: less than 1e-5 of it is left

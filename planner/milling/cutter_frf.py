@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.frf.matrix import labelled_frfs
-from planner.frf.quantities import convert
+from planner.frf.synthesis import convert
 from planner.milling.cut import Cut
 from planner.recording.read import read_frfs
 from planner.recording.records import AXES

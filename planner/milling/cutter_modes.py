@@ -16,11 +16,11 @@ from planner.errors import InputError
 from planner.frf.synthesis import pole, receptance
 from planner.milling.cut import check_limits, check_unit
 from planner.milling.cutter_frf import CutterFrf
-from planner.modal.estimate_modes import PoleIdentification, identify, inflation
+from planner.modal.estimate_modes import identify, inflation
 from planner.modal.fit_data import Data
 from planner.modal.rank_one_fit import Entries
 from planner.modal.residues import unpack
-from planner.modal.shape_fit import ShapeFit, shape_fit
+from planner.modal.shape_fit import shape_fit
 from planner.toml_file import load_toml
 
 
@@ -132,7 +132,6 @@ def _check(mode: StatedMode, where: str) -> None:
     check_unit(where, direction=mode.direction)
 
 
-@dataclass(frozen=True, eq=False)
 class CutterFit:
     """FRFs in the plane of a cut and the modes found in them.
 
@@ -140,13 +139,7 @@ class CutterFit:
     of one column where some are not.
     """
 
-    frf: CutterFrf
-    there: np.ndarray
-    found: PoleIdentification
-    shaped: ShapeFit
-
-    @classmethod
-    def of(cls, frf: CutterFrf) -> "CutterFit":
+    def __init__(self, frf: CutterFrf) -> None:
         """InputError where the FRFs hold no mode."""
         accelerance = frf.receptance * (2j * np.pi * frf.frequency_hz) ** 2
         there = np.any(accelerance != 0, axis=-1)
@@ -166,7 +159,8 @@ class CutterFit:
         alone = np.zeros((2 * found.fit.poles.size,) * 2)
         scale = found.scale * inflation(data, found.fit, alone)
         rows, columns = np.nonzero(there)
-        return cls(frf, there, found, shape_fit(data, found.fit, Entries(rows, columns, 2), scale))
+        self.frf, self.there, self.found = frf, there, found
+        self.shaped = shape_fit(data, found.fit, Entries(rows, columns, 2), scale)
 
     @cached_property
     def modes(self) -> CutterModes:

@@ -8,7 +8,6 @@ enters or leaves; between two such angles it is smooth: elements lie between the
 polynomials through the points of an element converge.
 """
 
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 
@@ -93,7 +92,6 @@ def lagrange(nodes: np.ndarray, at: np.ndarray) -> np.ndarray:
     return found
 
 
-@dataclass(frozen=True, eq=False)
 class Engagement:
     """Elements of one period in which teeth cut, as angles (rad) of the first tooth's tip.
 
@@ -101,50 +99,33 @@ class Engagement:
     teeth cut in it. `segment` (e,): elements with the same number follow without a jump.
     """
 
-    period: float
-    offset: float
-    start: np.ndarray
-    end: np.ndarray
-    teeth: tuple[tuple[int, ...], ...]
-    segment: np.ndarray
+    def __init__(self, cut: Cut, depth_m: float, longest_rad: float) -> None:
+        """Elements no longer than `longest_rad`; with a helix they depend on the depth.
+
+        One tooth's period if all teeth follow alike, else a turn of the spindle.
+        """
+        self.offset, end = cut.immersion_rad
+        self.period = 2 * np.pi / cut.teeth if cut.even else 2 * np.pi
+        lag = cut.lag_rad_m * depth_m
+        ahead = tooth_angles(cut)
+        edges = np.array([self.offset, self.offset + lag, end, end + lag])
+        breaks = np.mod(edges[None, :] - ahead[:, None] - self.offset, self.period).ravel()
+        breaks = np.sort(breaks[(breaks > APART) & (self.period - breaks > APART)])
+        apart = breaks[np.diff(breaks, prepend=0.0) > APART]
+        found: list[tuple[float, float, tuple[int, ...], int]] = []
+        for k, (a, b) in enumerate(pairwise([0.0, *apart.tolist(), self.period])):
+            tip = np.mod((a + b) / 2 + ahead, 2 * np.pi) + self.offset
+            cutting = tuple(np.flatnonzero(tip < end + lag).tolist())
+            if cutting:
+                cuts = np.linspace(a, b, 1 + max(1, int(np.ceil((b - a) / longest_rad))))
+                found += [(x, y, cutting, k) for x, y in pairwise(cuts)]
+        first, last, self.teeth, segment = zip(*found, strict=True)
+        self.start, self.end, self.segment = map(np.array, (first, last, segment))
 
 
 def tooth_angles(cut: Cut) -> np.ndarray:
     """(teeth,): by how much each tooth is ahead of the first one."""
     return np.concatenate([[0.0], np.cumsum(cut.pitches_rad)[:-1]])
-
-
-def contact(cut: Cut, depth_m: float, longest_rad: float) -> Engagement:
-    """Elements no longer than `longest_rad`; with a helix they depend on the depth.
-
-    One tooth's period if all teeth follow alike, else a turn of the spindle.
-    """
-    start, end = cut.immersion_rad
-    period = 2 * np.pi / cut.teeth if cut.even else 2 * np.pi
-    lag = cut.lag_rad_m * depth_m
-    ahead = tooth_angles(cut)
-    edges = np.array([start, start + lag, end, end + lag])
-    breaks = np.mod(edges[None, :] - ahead[:, None] - start, period).ravel()
-    breaks = _distinct(np.append(breaks, [0.0, period]), period)
-    found: list[tuple[float, float, tuple[int, ...], int]] = []
-    for k, (a, b) in enumerate(pairwise(breaks)):
-        tip = np.mod((a + b) / 2 + ahead, 2 * np.pi) + start
-        inside = tip < end + lag
-        cutting = tuple(int(j) for j in np.flatnonzero(inside))
-        if cutting:
-            cuts = np.linspace(a, b, 1 + max(1, int(np.ceil((b - a) / longest_rad))))
-            found += [(x, y, cutting, k) for x, y in pairwise(cuts)]
-    first, last, teeth, segment = zip(*found, strict=True)
-    arrays = np.array(first), np.array(last), teeth, np.array(segment)
-    return Engagement(float(period), start, *arrays)
-
-
-def _distinct(values: np.ndarray, period: float) -> np.ndarray:
-    kept = [0.0]
-    for value in np.sort(values):
-        if value - kept[-1] > APART and period - value > APART:
-            kept.append(float(value))
-    return np.array([*kept, period])
 
 
 def directions(

@@ -181,7 +181,7 @@ def _told(
     machine: Machine, rpm: float, factor: float, depth: float, error: float
 ) -> StabilityLimit:
     """Kind and chatter frequency at a limit."""
-    built = machine.period(rpm, machine.grid(rpm, factor), depth)
+    built = machine.period(rpm, factor, depth)
     values, vectors = np.linalg.eig(built.monodromy(np.array([depth]))[0])
     top = int(np.argmax(np.abs(values)))
     mu = complex(values[top])
@@ -237,14 +237,10 @@ class SampledLimits:
 
 
 def _quantile(values: np.ndarray, share: float) -> np.ndarray:
-    """(n,) linear between samples (s, n), inf where the upper of two is."""
-    ordered = np.sort(values, axis=0)
-    at = share * (len(values) - 1)
-    low = int(np.floor(at))
-    high = min(low + 1, len(values) - 1)
+    """(n,) linear between samples (s, n), the lower of two where the upper is inf."""
     with np.errstate(invalid="ignore"):
-        between = ordered[low] + (at - low) * (ordered[high] - ordered[low])
-    return np.where(np.isfinite(ordered[high]), between, ordered[low])
+        between = np.quantile(values, share, axis=0)
+    return np.where(np.isfinite(between), between, np.quantile(values, share, 0, method="lower"))
 
 
 def sampled_limits(

@@ -10,17 +10,19 @@ from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes
 from planner.milling.directional import mean_matrix, tooth_matrix
-from planner.milling.period import Discretisation, Period, period
+from planner.milling.period import Period, period
 
 NOTHING = 1e-60  # 1/m: of an eigenvalue
 
 
-@dataclass(frozen=True, eq=False)
 class LobeCurves:
     """Per line (f,) and eigenvalue λ (f, 2): 1/λ in m, depth of the limit (inf: none), phase."""
 
-    frequency_hz: np.ndarray
-    inverse: np.ndarray
+    def __init__(self, frequency_hz: np.ndarray, receptance: np.ndarray, mean: np.ndarray) -> None:
+        """Of receptances (f, 2, 2) in the cut's plane in m/N, and the mean matrix (2, 2), N/m²."""
+        values = _followed(np.linalg.eigvals(mean @ receptance))
+        # Where nothing gives way in a direction, next to nothing: its depth is beyond all others.
+        self.frequency_hz, self.inverse = frequency_hz, 1 / np.where(values == 0, NOTHING, values)
 
     @property
     def depth_m(self) -> np.ndarray:
@@ -48,14 +50,6 @@ def _depth(inverse: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = np.abs(inverse) ** 2 / (2 * inverse.real)
     return np.where((inverse.real > 0) & np.isfinite(depth), depth, np.inf)
-
-
-def curves(frequency_hz: np.ndarray, receptance: np.ndarray, mean: np.ndarray) -> LobeCurves:
-    """Of receptances (F, 2, 2) in the cut's plane, in m/N, and the mean matrix (2, 2) in N/m²."""
-    values = _followed(np.linalg.eigvals(mean @ receptance))
-    # Where nothing gives way in a direction, next to nothing: its depth is beyond all others.
-    values = np.where(values == 0, NOTHING, values)
-    return LobeCurves(np.asarray(frequency_hz, dtype=float), 1 / values)
 
 
 def _followed(values: np.ndarray) -> np.ndarray:
@@ -112,8 +106,8 @@ class Machine:
     modes: CutterModes
     cut: Cut
 
-    def grid(self, rpm: float, factor: float = 1.0) -> Discretisation:
-        """As fine as the fastest mode asks for at this speed, times a factor."""
+    def grid(self, rpm: float, factor: float) -> tuple[int, float]:
+        """Degree of polynomials and longest element in rad, times a factor what a mode asks for."""
         start, end = self.cut.immersion_rad
         arc = min(end - start, 2 * np.pi / self.cut.teeth)
         points = factor * (POINTS + PER_RADIAN * self.fastest * arc / (rpm * 2 * np.pi / 60))
@@ -125,25 +119,24 @@ class Machine:
             )
         # Most degree.
         elements = int(np.ceil(points / 32))
-        return Discretisation(int(np.ceil(points / elements)), arc / elements * (1 + 1e-9))
+        return int(np.ceil(points / elements)), arc / elements * (1 + 1e-9)
 
     @property
     def fastest(self) -> float:
         """The highest pole's size in rad/s."""
         return float(np.max(np.abs(self.modes.poles)))
 
-    def period(self, rpm: float, grid: Discretisation, depth_m: float) -> Period:
+    def period(self, rpm: float, factor: float, depth_m: float) -> Period:
         """Matrices of a period; `depth_m` matters with a helix only."""
-        return period(self.modes, self.cut, rpm, grid, depth_m)
+        return period(self.modes, self.cut, rpm, *self.grid(rpm, factor), depth_m)
 
     def monodromies(self, rpm: float, factor: float = 1.0) -> Monodromies:
         """By full discretisation, with so many times the usual points."""
-        grid = self.grid(rpm, factor)
         if self.cut.lag_rad_m == 0:
-            built = self.period(rpm, grid, 0.0)
+            built = self.period(rpm, factor, 0.0)
             return lambda depths: list(built.monodromy(depths))
         return lambda depths: [
-            self.period(rpm, grid, float(b)).monodromy(np.array([b]))[0] for b in depths
+            self.period(rpm, factor, float(b)).monodromy(np.array([b]))[0] for b in depths
         ]
 
     def floor(self) -> LobeCurves:
@@ -155,13 +148,10 @@ class Machine:
         wide = np.geomspace(hertz.min() / 20, hertz.max() * 20, 400)
         lines = np.concatenate([(hertz[:, None] + width[:, None] * near).ravel(), wide])
         lines = np.unique(lines[(lines > wide[0]) & (lines < wide[-1])])
-        return curves(lines, self.modes.receptance(lines), mean_matrix(self.cut))
+        return LobeCurves(lines, self.modes.receptance(lines), mean_matrix(self.cut))
 
 
-SEMI_STEPS, SEMI_PER_RADIAN = (
-    24,
-    3.0,
-)  # of a period, and more per radian of the fastest mode: for 1 %
+SEMI_STEPS, SEMI_PER_RADIAN = 24, 3.0  # of a period, more per radian of the fastest mode: for 1 %
 AVERAGED = 16  # points of a step, over which the directional matrix is averaged
 
 
@@ -231,29 +221,20 @@ def check_structure(modes: CutterModes) -> None:
 
 def multipliers(matrices: list[np.ndarray]) -> np.ndarray:
     """(B,) complex: of each monodromy the eigenvalue of largest size, imaginary part ≥ 0."""
-    found = np.empty(len(matrices), complex)
-    for size in {m.shape for m in matrices}:
-        which = [i for i, m in enumerate(matrices) if m.shape == size]
-        values = np.linalg.eigvals(np.array([matrices[i] for i in which]))
-        top = values[np.arange(len(which)), np.argmax(np.abs(values), axis=1)]
-        found[which] = top.real + 1j * np.abs(top.imag)
-    return found
+    every = map(np.linalg.eigvals, matrices)
+    top = np.array([values[np.argmax(np.abs(values))] for values in every], complex)
+    return top.real + 1j * np.abs(top.imag)
 
 
 FINER = 1.5  # factor on the points, until they suffice
 EXACT = 1e-7  # relative change of |µ| up to which points per period are added
 
 
-@dataclass(frozen=True)
-class Multiplier:
-    """Largest |µ| over one period (of a tooth, or of a turn where pitches differ), its error."""
+def multiplier(machine: Machine, rpm: float, depth_m: float) -> tuple[float, float]:
+    """Largest |µ| over one period (of a tooth, or of a turn where pitches differ), its error.
 
-    size: float
-    error: float
-
-
-def multiplier(machine: Machine, rpm: float, depth_m: float) -> Multiplier:
-    """At a speed in rpm and a depth in m, with points added until it stays."""
+    At a speed in rpm and a depth in m, with points added until it stays.
+    """
     factor, before = FINER, np.inf
     while True:
         built = machine.monodromies(rpm, factor)(np.array([depth_m]))
@@ -261,5 +242,5 @@ def multiplier(machine: Machine, rpm: float, depth_m: float) -> Multiplier:
         error = abs(size - before)
         # Most chips: points of a period: beyond them eigenvalues take minutes
         if error < EXACT * size or built[0].shape[0] * FINER > 600:
-            return Multiplier(size, error)
+            return size, error
         factor, before = factor * FINER, size

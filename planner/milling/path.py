@@ -8,13 +8,7 @@ import numpy as np
 from scipy.stats import norm
 
 from planner.milling.cut import Cut
-from planner.milling.lobes import (
-    PROBABILITY,
-    StabilityLimit,
-    depths_of,
-    sampled_limits,
-    stability_limits,
-)
+from planner.milling.lobes import StabilityLimit, depths_of, sampled_limits, stability_limits
 from planner.milling.machine import Machine, multipliers
 from planner.milling.structure import Structure, moved
 from planner.progress import ProgressCallback, no_progress, part_of
@@ -64,7 +58,7 @@ def limits_along(
         drawn = structure.samples(cut, samples)
         depth = depths_of(own)
         limits = sampled_limits(drawn, own, part) if drawn else None
-        robust.append(depth if limits is None else limits.robust(PROBABILITY))
+        robust.append(depth if limits is None else limits.robust())
         known.append(depth > 0 if limits is None else ~limits.open(depth))
         found.append(own)
         part("poses", 1.0)

@@ -14,20 +14,11 @@ from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes
 from planner.milling.directional import (
     Engagement,
-    contact,
     directions,
     each_tooth,
     lagrange,
     lobatto,
 )
-
-
-@dataclass(frozen=True, eq=False)
-class Discretisation:
-    """How finely the force is resolved: degree of its polynomials, length of an element in rad."""
-
-    degree: int
-    element_rad: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,55 +64,52 @@ class Period:
         return depth * (self.now @ (multiplier * v) - self.before @ v)
 
 
-@dataclass(frozen=True, eq=False)
 class _Points:
-    """Points of all elements, one after another: (p,) time, element, place in it, chip, force."""
+    """Points of all elements, one after another: (p,) angle, time, element and place in it.
 
-    time: np.ndarray
-    element: np.ndarray
-    place: np.ndarray
-    shared: np.ndarray  # number of the point, the same where elements meet without a jump
-    angle: np.ndarray
-    rows: np.ndarray  # (p, 2)
-    columns: np.ndarray  # (p, 2)
+    `shared` (p,) numbers them, the same where elements meet without a jump; `rows` (p, 2) are of
+    their chips, `columns` (p, 2) of their forces.
+    """
+
+    def __init__(
+        self, found: Engagement, cut: Cut, speed: float, degree: int, depth_m: float
+    ) -> None:
+        nodes, *_ = lobatto(degree)
+        parts: list[tuple[np.ndarray, ...]] = []
+        number = -1
+        for e, teeth in enumerate(found.teeth):
+            angle = found.start[e] + nodes * (found.end[e] - found.start[e])
+            rows, columns = directions(cut, teeth, angle + found.offset, depth_m)
+            if not cut.even:
+                rows = columns = np.broadcast_to(np.eye(2), (len(nodes), 2, 2))
+            rank = rows.shape[1]
+            joined = e > 0 and found.segment[e] == found.segment[e - 1]
+            first = number + 1 - rank if joined else number + 1
+            count = rank * len(nodes)
+            number = first + count - 1
+            parts.append((
+                np.repeat(angle, rank), np.full(count, e), np.repeat(np.arange(len(nodes)), rank),
+                first + np.arange(count), rows.reshape(-1, 2),
+                columns.transpose(0, 2, 1).reshape(-1, 2),
+            ))  # fmt: skip
+        self.angle, self.element, self.place, self.shared, self.rows, self.columns = map(
+            np.concatenate, zip(*parts, strict=True)
+        )
+        self.time = self.angle / speed
 
 
 def period(
-    modes: CutterModes,
-    cut: Cut,
-    rpm: float,
-    grid: Discretisation,
-    depth_m: float = 0.0,
+    modes: CutterModes, cut: Cut, rpm: float, degree: int, element_rad: float, depth_m: float
 ) -> Period:
-    """Of modes in the cut's plane at a speed; `depth_m` counts where the cutter has a helix."""
+    """Of modes in the cut's plane at a speed, by polynomials of a degree on elements.
+
+    `element_rad` is the longest element; `depth_m` counts where the cutter has a helix.
+    """
     speed = rpm * 2 * np.pi / 60
-    found = contact(cut, depth_m, grid.element_rad)
-    points = _points(found, cut, speed, grid.degree, depth_m)
-    built = _build(modes, found, points, speed, grid.degree)
-    return built if cut.even else _uneven(built, found, points, cut, grid.degree, depth_m)
-
-
-def _points(found: Engagement, cut: Cut, speed: float, degree: int, depth_m: float) -> _Points:
-    nodes, *_ = lobatto(degree)
-    parts: list[tuple[np.ndarray, ...]] = []
-    number = -1
-    for e, teeth in enumerate(found.teeth):
-        angle = found.start[e] + nodes * (found.end[e] - found.start[e])
-        rows, columns = directions(cut, teeth, angle + found.offset, depth_m)
-        if not cut.even:
-            rows = columns = np.broadcast_to(np.eye(2), (len(nodes), 2, 2))
-        rank = rows.shape[1]
-        joined = e > 0 and found.segment[e] == found.segment[e - 1]
-        first = number + 1 - rank if joined else number + 1
-        count = rank * len(nodes)
-        shared = first + np.arange(count)
-        number = first + count - 1
-        parts.append((
-            np.repeat(angle, rank), np.full(count, e), np.repeat(np.arange(len(nodes)), rank),
-            shared, rows.reshape(-1, 2), columns.transpose(0, 2, 1).reshape(-1, 2),
-        ))  # fmt: skip
-    angle, element, place, shared, rows, columns = map(np.concatenate, zip(*parts, strict=True))
-    return _Points(angle / speed, element, place, shared, angle, rows, columns)
+    found = Engagement(cut, depth_m, element_rad)
+    points = _Points(found, cut, speed, degree, depth_m)
+    built = _build(modes, found, points, speed, degree)
+    return built if cut.even else _uneven(built, found, points, cut, degree, depth_m)
 
 
 def _build(

@@ -13,7 +13,7 @@ from planner.milling.cutter_frf import CutterFrf
 from planner.milling.cutter_modes import CutterFit, CutterModes, ModeFile, hidden_below
 from planner.milling.directional import mean_matrix
 from planner.milling.lobes import OPEN, REPLICATES
-from planner.milling.machine import LobeCurves, Machine, check_structure, curves
+from planner.milling.machine import LobeCurves, Machine, check_structure
 
 STEP = 1e-4  # relative, of derivatives
 MOST_DAMPING = 0.95
@@ -144,14 +144,15 @@ def of_frf(frf: CutterFrf, cut: Cut) -> Structure:
     """From FRFs, predicted with an sd or measured: modes are fitted, and how well is said."""
     plane, mean = frf.in_plane(cut), mean_matrix(cut)
     if plane.sd is not None:
-        check_band(plane, curves(plane.frequency_hz, plane.receptance.transpose(2, 0, 1), mean))
-    fit = CutterFit.of(plane)
+        h = plane.receptance.transpose(2, 0, 1)
+        check_band(plane, LobeCurves(plane.frequency_hz, h, mean))
+    fit = CutterFit(plane)
     check_structure(fit.modes)
     if plane.sd is None:
         floor = Machine(fit.modes, cut).floor().floor_m
         # Lines in the noise tell nothing of modes below, whose flank may seem to matter there.
         told = plane.frequency_hz > (hidden_below(fit, mean, floor) or 0.0)
-        check_band(plane, curves(plane.frequency_hz, fit.receptance(told), mean), told)
+        check_band(plane, LobeCurves(plane.frequency_hz, fit.receptance(told), mean), told)
     spread, given = explaining(fit.modes, plane)
     count = len(np.unique(fit.modes.poles))
     remarks = [

@@ -26,16 +26,19 @@ from planner.recording.points import Dof
 from planner.recording.uff import Geometry
 
 
-@dataclass(frozen=True)
 class DrivingPoint:
     """A point hit where it was felt; shares in [0, 1].
 
     `positive` is the share of |Im H| that has the right sign, `modes` that of the modes' residues.
     """
 
-    dof: Dof
-    positive: float
-    modes: float
+    def __init__(
+        self, matrix: FrfMatrix, sides: RovingSides, lines: np.ndarray, row: int, column: int
+    ) -> None:
+        imag, residues = matrix.roved.accelerance[row, column, lines].imag, sides.table[row, column]
+        size, self.dof = np.abs(residues), sides.columns[column]
+        self.positive = float(np.sum(imag[imag > 0]) / max(np.sum(np.abs(imag)), 1e-300))
+        self.modes = float(np.sum(size[np.real(residues) > 0]) / max(np.sum(size), 1e-300))
 
 
 @dataclass(frozen=True)
@@ -73,9 +76,9 @@ def check(
     geometry: Geometry | None = None,
 ) -> Consistency:
     """Check FRFs and residues of the modes (indices) that were established."""
-    sides, (low, high) = RovingSides.of(matrix, found, modes), found.data.frequency_hz[[0, -1]]
+    sides, (low, high) = RovingSides(matrix, found, modes), found.data.frequency_hz[[0, -1]]
     lines = (matrix.frequency_hz >= low) & (matrix.frequency_hz <= high)
-    driving = tuple(_driving(matrix, sides, lines, *pair) for pair in sides.driving)
+    driving = tuple(DrivingPoint(matrix, sides, lines, *pair) for pair in sides.driving)
     reciprocity = _reciprocity(matrix, found, modes)
     # Least modes that tell of signs and places
     enough = modes.size >= 3
@@ -94,7 +97,7 @@ def check(
     elif enough and not turning_helps(sides, turned):
         swapped = exchanged_by_columns(sides) or exchanged_by_neighbours(sides, geometry)
     turned, rows = ((), ()) if swapped else (turned, rows)
-    faults = [swapped.text] if swapped else []
+    faults = [swapped[0]] if swapped else []
     faults += _turned(turned, len(driving), reciprocity)
     done = "hit" if sides.hit else "felt"
     faults += [
@@ -105,23 +108,11 @@ def check(
     single, entries = odd_entries(sides) if enough else ([], [])
     faults += single
     odd = tuple((sides.rows[row], sides.columns[column]) for row, column in entries)
-    untied = tuple(dof for dof in sides.columns if swapped and dof in swapped.dofs)
+    untied = tuple(dof for dof in sides.columns if swapped and dof in swapped[1])
     told = () if faults else _remarks(reciprocity)
     if not driving:
         told = (*told, "No point was hit where it was felt: shapes are not scaled.")
     return Consistency(driving, tuple(faults), told, turned, rows, untied, odd)
-
-
-def _driving(
-    matrix: FrfMatrix, sides: RovingSides, lines: np.ndarray, row: int, column: int
-) -> DrivingPoint:
-    dof = sides.columns[column]
-    imag = np.imag(matrix.accelerance[matrix.index(dof), matrix.references.index(dof), lines])
-    residues = sides.table[row, column]
-    size = np.abs(residues)
-    modes = float(np.sum(size[np.real(residues) > 0]) / max(np.sum(size), 1e-300))
-    positive = float(np.sum(imag[imag > 0]) / max(np.sum(np.abs(imag)), 1e-300))
-    return DrivingPoint(dof, positive, modes)
 
 
 def _reciprocity(
@@ -133,11 +124,8 @@ def _reciprocity(
     height = fit.residue[:, modes] / decay
     noise = 2 * found.scale[modes] * fit.residue_variance[:, modes] / decay**2
     entry = {pair: e for e, pair in enumerate(zip(*found.data.places, strict=True))}
-    both = [
-        (d, matrix.index(d), i) for i, d in enumerate(matrix.references) if d in matrix.responses
-    ]
     out = []
-    for (dof, o, i), (dof_too, o_too, i_too) in combinations(both, 2):
+    for (o, i), (o_too, i_too) in combinations(matrix.both, 2):
         # Response at the second point to a hit at the first, and the other way round
         e, other = entry.get((o_too, i)), entry.get((o, i_too))
         if e is None or other is None:
@@ -147,7 +135,8 @@ def _reciprocity(
         ratio = float(np.real(np.vdot(one, two)) / max(np.linalg.norm(one) ** 2, 1e-300))
         beyond = np.linalg.norm(one - two) ** 2 - np.sum(noise[e] + noise[other])
         apart = float(np.sqrt(max(beyond, 0.0) / max(size, 1e-300)))
-        out.append(Reciprocity(dof_too, dof, apart, ratio))
+        points = matrix.references[i_too], matrix.references[i]
+        out.append(Reciprocity(*points, apart, ratio))
     return tuple(out)
 
 

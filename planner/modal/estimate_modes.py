@@ -68,7 +68,7 @@ def _step(data: Data, fitted: PoleFit, part: slice) -> tuple[np.ndarray, np.ndar
     Linearised where all lines have them: poles that a part does not hold would stray in a fit, to
     where their variance is that of another place.
     """
-    sets = WeightedSets.of(data.lines.part(part), data.values[:, part], fitted.variance[:, part])
+    sets = WeightedSets(data.lines.part(part), data.values[:, part], fitted.variance[:, part])
     point = reduced_together(sets, fitted.poles)
     unit = np.sqrt(np.maximum(np.diag(fitted.covariance), 1e-300))
     turned = np.outer(unit, unit)

@@ -41,25 +41,21 @@ def analyse_record(
     samples, names = _decays(record, force, remarks)
     rate = record.sampling_rate_hz
     band = band_hz or (max(10 * rate / samples.shape[-1], 0.01 * rate), 0.45 * rate)
-    names, every, found = _identify_sound(record, samples, names, band, remarks)
+    names, every, found = _identify_sound(samples, rate, names, band, remarks)
     sure = [mode for mode in every if mode.probability >= 0.5]
     kept = [mode for mode in sure if band[0] <= mode.frequency_hz <= band[1]]
     modes = tuple(_merged(group, remarks) for group in grouped(kept, _same))
-    if not modes:
-        raise RefusedError(_nothing(record, band))
+    if found is None or not modes:
+        raise RefusedError(
+            f"{record.source}: no decaying oscillation stands out between {band[0]:g} and"
+            f" {band[1]:g} Hz; record longer after the hit or hit harder."
+        )
     remarks.append(
         "Modes are from free decays, shapes in the order "
         + ", ".join(names)
         + "; without a usable force they are not scaled."
     )
     return ModalModel(modes, band, found.fit_error, found.diagram.order, tuple(remarks)), found
-
-
-def _nothing(record: TimeRecord, band: tuple[float, float]) -> str:
-    return (
-        f"{record.source}: no decaying oscillation stands out between {band[0]:g} and"
-        f" {band[1]:g} Hz; record longer after the hit or hit harder."
-    )
 
 
 def _decays(
@@ -127,15 +123,15 @@ def _lifetime(values: np.ndarray, starts: list[int], length: int, rate: float) -
 
 
 def _identify_sound(
-    record: TimeRecord, samples: np.ndarray, names: tuple[str, ...], band: tuple[float, float],
+    samples: np.ndarray, rate: float, names: tuple[str, ...], band: tuple[float, float],
     remarks: list[str],
-) -> tuple[tuple[str, ...], tuple[Mode, ...], PoleIdentification]:  # fmt: skip
+) -> tuple[tuple[str, ...], tuple[Mode, ...], PoleIdentification | None]:  # fmt: skip
     """Identify, leave out channels that the modes do not explain, identify again."""
     factor = np.std(samples, axis=(1, 2))[:, None]
     factor[factor == 0] = 1.0
-    found = identify_decays(samples / factor[..., None], record.sampling_rate_hz, band)
+    found = identify_decays(samples / factor[..., None], rate, band)
     if found is None or not found.modes:
-        raise RefusedError(_nothing(record, band))
+        return names, (), found
     explained = _explained(found, band)
     # A channel responds if its energy in the band after the hit exceeds that at the end this much,
     # in units of the scatter of such a ratio, or if the modes found explain this share of it.
@@ -153,7 +149,7 @@ def _identify_sound(
             " it): it was left out; check the sensor and its cable."
         )
     names = tuple(np.array(names)[sound].tolist())
-    return _identify_sound(record, samples[sound], names, band, remarks)
+    return _identify_sound(samples[sound], rate, names, band, remarks)
 
 
 def _explained(found: PoleIdentification, band: tuple[float, float]) -> np.ndarray:

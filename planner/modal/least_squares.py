@@ -16,7 +16,6 @@ import numpy as np
 from planner.modal.residues import Lines, basis, basis_slope, stack
 
 
-@dataclass(frozen=True, eq=False)
 class WeightedSets:
     """Responses by set, weighted: `values` (k, e, 2F) real, then imaginary parts.
 
@@ -25,20 +24,13 @@ class WeightedSets:
     that of the profile by which lines count.
     """
 
-    lines: Lines
-    entries: np.ndarray
-    values: np.ndarray
-    weight: np.ndarray
-    root: np.ndarray
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         lines: Lines,
         response: np.ndarray,
         variance: np.ndarray,
         sets: tuple[np.ndarray, ...] = (),
-    ) -> "WeightedSets":
+    ) -> None:
         """From responses and variance (entries, F), in each set a level times a profile.
 
         Without `sets` all entries are one, or one each where their profiles differ.
@@ -49,12 +41,10 @@ class WeightedSets:
         entries = np.full((len(sets), max(map(len, sets))), -1)
         for row, chosen in zip(entries, sets, strict=True):
             row[: len(chosen)] = chosen
-        first = variance[entries[:, :1]]
-        root = np.sqrt(first[..., :1] / first)
-        there = entries >= 0
-        values = stack(response[entries] * root) * there[..., None]
-        weight = np.where(there, 2 / variance[entries, 0], 0.0)
-        return cls(lines, entries, values, weight, root)
+        first, there = variance[entries[:, :1]], entries >= 0
+        self.lines, self.entries, self.root = lines, entries, np.sqrt(first[..., :1] / first)
+        self.values = stack(response[entries] * self.root) * there[..., None]
+        self.weight = np.where(there, 2 / variance[entries, 0], 0.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -135,8 +135,7 @@ def _with_vectors(
     group, _ = entries.groups
     if len(np.unique(group[entries.rows])) > 1:
         return modes
-    there = [(matrix.index(d), i) for i, d in enumerate(matrix.references) if d in matrix.responses]
-    o, i = np.array(there, int).reshape(-1, 2).T
+    o, i = np.array(matrix.both, int).reshape(-1, 2).T
 
     def apart(k: int, mode: Mode) -> Eigenvectors:
         fitted = _shape(found, k, entries)

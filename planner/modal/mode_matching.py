@@ -23,9 +23,7 @@ def best(gain: np.ndarray, ordered: bool = False) -> np.ndarray:
         return _best_ordered(gain)
     chosen = np.full(gain.shape[0], -1)
     rows, columns = least_cost(-np.maximum(gain, 0.0))
-    for row, column in zip(rows, columns, strict=True):
-        if gain[row, column] > 0:
-            chosen[row] = column
+    chosen[rows] = np.where(gain[rows, columns] > 0, columns, -1)
     return chosen
 
 

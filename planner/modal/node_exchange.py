@@ -5,7 +5,7 @@ so, the two were exchanged. Rows without a column are told by how their neighbou
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import combinations
 
@@ -19,7 +19,6 @@ from planner.recording.points import Dof
 from planner.recording.uff import Geometry
 
 
-@dataclass(frozen=True, eq=False)
 class RovingSides:
     """Rows are the points of the longer side (which roved), columns those that stayed.
 
@@ -28,19 +27,13 @@ class RovingSides:
     (row, column) of points that were measured against themselves.
     """
 
-    rows: tuple[Dof, ...]
-    columns: tuple[Dof, ...]
-    table: np.ndarray
-    hit: bool
-    driving: tuple[tuple[int, int], ...]
-
-    @classmethod
-    def of(cls, matrix: FrfMatrix, found: PoleIdentification, modes: np.ndarray) -> "RovingSides":
+    def __init__(self, matrix: FrfMatrix, found: PoleIdentification, modes: np.ndarray) -> None:
         """From residues of the modes (indices)."""
         values, side = found.fit.residue[:, modes] * 2j * found.fit.poles[modes].imag, matrix.roved
-        table = np.full((*side.measured.shape, modes.size), np.nan + 0j)
-        table[found.data.row, found.data.column] = values
-        return cls(side.responses, side.references, table, matrix.hit, side.driving)
+        self.table = np.full((*side.measured.shape, modes.size), np.nan + 0j)
+        self.table[found.data.row, found.data.column] = values
+        self.rows, self.columns = side.responses, side.references
+        self.hit, self.driving = matrix.hit, side.driving
 
     @cached_property
     def motions(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -147,12 +140,8 @@ def _turned(found: RowPrediction, node: np.ndarray) -> float:
 FITS, BETTER = 0.3, 0.6
 
 
-@dataclass(frozen=True)
-class Exchange:
-    """Two points or nodes whose rows fit each other's places: a sentence, and whom it concerns."""
-
-    text: str
-    dofs: frozenset[Dof]
+# Two points or nodes whose rows fit each other's places: a sentence, and whom it concerns.
+Exchange = tuple[str, frozenset[Dof]]
 
 
 def exchanged_by_neighbours(sides: RovingSides, geometry: Geometry | None) -> Exchange | None:
@@ -167,7 +156,7 @@ def exchanged_by_neighbours(sides: RovingSides, geometry: Geometry | None) -> Ex
         "the points around them in the modes, swapped they move with them. Check the labels."
     )
     concerned = (dof for dof in (*sides.rows, *sides.columns) if dof.node in pair)
-    return Exchange(text, frozenset(concerned))
+    return text, frozenset(concerned)
 
 
 def turning_helps(sides: RovingSides, turned: tuple[Dof, ...]) -> bool:
@@ -204,7 +193,7 @@ def exchanged_by_columns(sides: RovingSides) -> Exchange | None:
         f"and listening there differ by {100 * stated:.0f} %, swapped by {100 * tried[a, b]:.0f} %."
         " Check the labels."
     )
-    return Exchange(text, frozenset((a, b)))
+    return text, frozenset((a, b))
 
 
 def _misfit(shape: np.ndarray, columns: np.ndarray, rows: np.ndarray) -> float:

@@ -98,7 +98,7 @@ def refine(data: Data, variance: np.ndarray, start: np.ndarray) -> PoleFit:
 
     From `start` (m,) in rad/s, m ≥ 1; a step to poles that are not allowed is shortened.
     """
-    sets = WeightedSets.of(data.lines, data.values, variance)
+    sets = WeightedSets(data.lines, data.values, variance)
     poles = data.to_plane(np.asarray(start, complex))
     point, damping = reduced_together(sets, poles), DAMPING
     # Damped Gauss-Newton steps (Levenberg-Marquardt)
@@ -145,7 +145,7 @@ def shared_error(data: Data, fit: PoleFit) -> tuple[np.ndarray, np.ndarray]:
     if data.force_share is None:
         return np.zeros((2 * m, 2 * m)), np.zeros((data.entries, m))
     errors = data.force_errors(data.values - fit.error)
-    sets = WeightedSets.of(data.lines, data.values, fit.variance)
+    sets = WeightedSets(data.lines, data.values, fit.variance)
     point, p = reduced_together(sets, fit.poles), fit.coefficients.shape[1]
     inverse = (point.inverse[:, None] / sets.weight[..., None, None]).reshape(-1, p, p)
     sensitivity = point.sensitivity.reshape(-1, p, 2 * m)
@@ -179,7 +179,7 @@ def fit_sets(
     spread, covariance = np.zeros(2 * m), np.zeros((2 * m, 2 * m))
     chosen = slice(None) if lines is None else lines
     some = data.lines.part(chosen), data.values[:, chosen], variance[:, chosen]
-    part = WeightedSets.of(*some, data.sets)
+    part = WeightedSets(*some, data.sets)
     for _ in range(rounds):
         point = reduced(part, complex_of(own))
         spread = _spread(point, own, common)

@@ -6,7 +6,6 @@ or its residues do not go with how the modes take part at the references, which 
 poles are then looked for on a grid, one mode after the other, each mode excited as in all sets.
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +13,7 @@ import numpy as np
 from planner.modal.fit_data import Data
 from planner.modal.mac import grouped
 from planner.modal.pole_fit import FARTHEST, PoleFit
-from planner.modal.residues import Lines, basis, response, stack
+from planner.modal.residues import basis, response, stack
 
 # Poles are looked for up to so many sds of the sets' poles, and half bandwidths, from the common
 # ones; the lines looked at reach so many half bandwidths farther.
@@ -33,7 +32,7 @@ def reestimated_sets(data: Data, fit: PoleFit) -> np.ndarray | None:
     for group in grouped(order, lambda a, b: imag[b] - imag[a] < far[a] + far[b]):
         modes = np.array(group)
         for s in np.flatnonzero(off[:, modes].any(axis=1)):
-            found = _Neighbourhood.of(data, fit, shares, int(s), modes).best()
+            found = _Neighbourhood(data, fit, shares, int(s), modes).best()
             if found is not None:
                 own[s, modes] = found
                 moved = True
@@ -93,7 +92,6 @@ def _apart(data: Data, fit: PoleFit, theirs: np.ndarray) -> np.ndarray:
     return apart > 9.0 * np.maximum(np.median(apart, axis=0), 1.0)
 
 
-@dataclass(frozen=True, eq=False)
 class _Neighbourhood:
     """Responses of one set around modes that lie together, weighted.
 
@@ -103,40 +101,25 @@ class _Neighbourhood:
     far they are looked for, `spread` of their imaginary parts.
     """
 
-    lines: Lines
-    profile: np.ndarray
-    level: np.ndarray
-    values: np.ndarray
-    far: np.ndarray
-    rows: np.ndarray
-    shares: np.ndarray
-    common: np.ndarray
-    own: np.ndarray
-    reach: np.ndarray
-    spread: np.ndarray
-
-    @classmethod
-    def of(
-        cls, data: Data, fit: PoleFit, shares: np.ndarray, s: int, modes: np.ndarray
-    ) -> "_Neighbourhood":
+    def __init__(
+        self, data: Data, fit: PoleFit, shares: np.ndarray, s: int, modes: np.ndarray
+    ) -> None:
         """Of set s around some modes (indices), which take part in all entries by shares (e, m)."""
         entries = data.sets[s]
         chosen = np.flatnonzero(np.any([_near(data, fit, j) for j in modes], axis=0))
-        lines, common = data.lines.part(chosen), fit.poles[modes]
-        others = np.setdiff1d(np.arange(fit.poles.size), modes)
-        apart = response(lines, fit.own[s, others], fit.residue[np.ix_(entries, others)])
-        variance = fit.variance[np.ix_(entries, chosen)]
+        self.lines, self.rows = data.lines.part(chosen), data.row[entries]
+        self.shares, self.reach = shares[np.ix_(entries, modes)], _reach(fit)[modes]
+        self.common, self.own = fit.poles[modes], fit.own[s, modes]
         # In any case a pole may move by half its bandwidth.
-        spread = np.maximum(fit.spread[fit.poles.size + modes], common.real**2)
-        profile = np.sqrt(variance[0, 0] / variance[0])
-        line = np.stack([np.ones(lines.x.size), np.linspace(-1, 1, lines.x.size)]) * profile
-        far = np.linalg.qr(stack(np.concatenate([line, 1j * line])).T)[0]
-        values = stack((data.values[np.ix_(entries, chosen)] - apart) * profile)
-        return cls(
-            lines, profile, variance[:, 0] / 2, values - values @ far @ far.T, far,
-            data.row[entries], shares[np.ix_(entries, modes)], common, fit.own[s, modes],
-            _reach(fit)[modes], spread,
-        )  # fmt: skip
+        self.spread = np.maximum(fit.spread[fit.poles.size + modes], self.common.real**2)
+        variance = fit.variance[np.ix_(entries, chosen)]
+        self.level, self.profile = variance[:, 0] / 2, np.sqrt(variance[0, 0] / variance[0])
+        line = np.stack([np.ones(chosen.size), np.linspace(-1, 1, chosen.size)]) * self.profile
+        self.far = np.linalg.qr(stack(np.concatenate([line, 1j * line])).T)[0]
+        others = np.setdiff1d(np.arange(fit.poles.size), modes)
+        apart = response(self.lines, fit.own[s, others], fit.residue[np.ix_(entries, others)])
+        values = stack((data.values[np.ix_(entries, chosen)] - apart) * self.profile)
+        self.values = values - values @ self.far @ self.far.T
 
     def best(self) -> np.ndarray | None:
         """Poles (n,) that fit clearly better than those of now, None where there are none."""

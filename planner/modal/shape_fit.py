@@ -6,7 +6,7 @@ nothing (phases, modes outside the lines) is taken away and the rest fitted agai
 surer by far where FRFs are small: beside a resonance, between two, in differences of them.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -80,9 +80,9 @@ def shape_fit(
         most = float(chi2.ppf(SURELY, max(1, fewer)))
         return after - before > most * max(1.0, before / freedom)
 
-    problem = _ShapeProblem.of(data, fit, entries)
+    problem = _ShapeProblem(data, fit, entries, True)
     point = problem.settled(problem.start(fit), np.ones(problem.size, bool))
-    unshaped = replace(problem, shaped=problem.shaped[:0])
+    unshaped = _ShapeProblem(data, fit, entries, False)
     if surely_worse(float(np.sum(fit.chi2)), point.chi2, unshaped.size - problem.size):
         problem, point = unshaped, unshaped.start(fit)
     every = np.ones(problem.size, bool)
@@ -120,7 +120,6 @@ class _ShapePoint:
         return own / np.sqrt(values[some]) @ own.T / unit[:, None]
 
 
-@dataclass(frozen=True, eq=False)
 class _ShapeProblem:
     """Weights 2/variance (e, F) of the responses; `shaped` are the modes that have one shape each.
 
@@ -128,21 +127,14 @@ class _ShapeProblem:
     that are `left` free: residues of other modes, out-of-band terms.
     """
 
-    data: Data
-    weight: np.ndarray
-    entries: Entries
-    modes: int
-    shaped: np.ndarray
-
-    @classmethod
-    def of(cls, data: Data, fit: PoleFit, entries: Entries) -> "_ShapeProblem":
-        poles, count = fit.poles, data.entries
+    def __init__(self, data: Data, fit: PoleFit, entries: Entries, reciprocal: bool) -> None:
+        poles, self.data, self.entries, self.weight = fit.poles, data, entries, 2 / fit.variance
         apart = np.abs(poles[:, None] - poles) + np.diag(np.full(poles.size, np.inf))
         wide = np.maximum(np.abs(poles.real)[:, None], np.abs(poles.real))
         alone = np.all(apart > wide / 2, axis=1)
         alone &= np.abs(poles) < 2 * np.pi * data.frequency_hz[-1]
-        alone &= count > entries.points  # or nothing would tie the points
-        return cls(data, 2 / fit.variance, entries, poles.size, np.flatnonzero(alone))
+        alone &= data.entries > entries.points  # or nothing would tie the points
+        self.modes, self.shaped = poles.size, np.flatnonzero(alone & reciprocal)
 
     @cached_property
     def left(self) -> np.ndarray:

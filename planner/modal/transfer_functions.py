@@ -9,7 +9,7 @@ response at their frequency.
 import numpy as np
 
 from planner.errors import InputError, RefusedError
-from planner.frf.quantities import DERIVATIVE, convert
+from planner.frf.synthesis import DERIVATIVE, convert
 from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.mode_selection import presences
 from planner.modal.modes import UNSCALED, ModalModel, Mode

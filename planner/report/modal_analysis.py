@@ -15,7 +15,7 @@ from planner.diagnosis.exponential_window import screen_window
 from planner.errors import InputError, RefusedError, RefusedFile
 from planner.frf.frf import Frf
 from planner.frf.matrix import joined
-from planner.frf.quantities import DERIVATIVE
+from planner.frf.synthesis import DERIVATIVE
 from planner.modal.estimate_modes import PoleIdentification, identification
 from planner.modal.matrix_modes import modes_of_matrix, with_normal_modes
 from planner.modal.modes import ModalModel

@@ -66,11 +66,11 @@ def stability_of(
     lines = [text for kind, text in KINDS.items() if kind in kinds]
     more: dict[str, Any] = {"depth_error": [one.error for one in found]}
     if point is not None:
-        there = multiplier(machine, *point)
-        more |= {"multiplier": there.size, "multiplier_error": there.error}
+        growth, error = multiplier(machine, *point)
+        more |= {"multiplier": growth, "multiplier_error": error}
         lines.append(
-            f"At the point |µ| = {there.size:.6f}, the growth of a disturbance from one period to "
-            f"the next: {'stable' if there.size < 1 else 'not stable'}."
+            f"At the point |µ| = {growth:.6f}, the growth of a disturbance from one period to "
+            f"the next: {'stable' if growth < 1 else 'not stable'}."
         )
     simulated = structure.frf is not None and structure.frf.simulated
     name = ", ".join(filter(None, (asked.source.name, asked.pose)))

@@ -5,7 +5,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from planner.milling.machine import Machine, multipliers
-from planner.milling.period import Discretisation
+from planner.milling.period import period
 from tests.support.milling_cases import MULTIPLIERS, cut, one_mode, semi_growth
 from tests.support.timing import spent
 
@@ -14,7 +14,8 @@ RPM, DEPTH_MM = 5000.0, 0.5
 
 def full_error(asked: Machine, degree: int, elements: int) -> float:
     """Of |µ|, with polynomials of a degree on so many elements."""
-    built = asked.period(RPM, Discretisation(degree, np.pi / elements * (1 + 1e-9)), 0.0)
+    longest = np.pi / elements * (1 + 1e-9)
+    built = period(asked.modes, asked.cut, RPM, degree, longest, 0.0)
     size = abs(multipliers(list(built.monodromy(np.array([DEPTH_MM * 1e-3]))))[0])
     return abs(size - MULTIPLIERS[DEPTH_MM])
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from planner.errors import InputError, RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.matrix import from_records, labelled_frfs, matrix_of
-from planner.frf.quantities import DERIVATIVE, convert
+from planner.frf.synthesis import DERIVATIVE, convert
 from planner.milling import cutter_frf, tip_files
 from planner.milling.tool import Point, Tool
 from planner.recording.records import End, FrfRecord, Hit

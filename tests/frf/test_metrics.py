@@ -121,11 +121,11 @@ def test_poses_with_lines_of_their_own_are_stacked():
     measured, simulated = random_frf(9), random_frf(10)
     whole = metrics.agreement(measured, simulated)
     parts = [metrics.agreement(measured[i : i + 1], simulated[i : i + 1]) for i in range(3)]
-    stacked = metrics.stack(parts)
+    stacked = metrics.Agreement.joined(parts)
     np.testing.assert_array_equal(stacked.frac, whole.frac)
     np.testing.assert_array_equal(stacked.frobenius, whole.frobenius)
     finer = np.repeat(measured[2:], 2, axis=-1), np.repeat(simulated[2:], 2, axis=-1)
-    joined = metrics.stack([*parts[:2], metrics.agreement(*finer)])
+    joined = metrics.Agreement.joined([*parts[:2], metrics.agreement(*finer)])
     np.testing.assert_allclose(joined.global_frac, whole.global_frac)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError
-from planner.frf.quantities import convert
+from planner.frf.synthesis import convert
 from planner.milling.cut import Cut
 from planner.milling.cutter_frf import CutterFrf, of_accelerance
 from planner.milling.cutter_modes import CutterFit, CutterModes, real_modes
@@ -251,7 +251,7 @@ def test_mean_of_uncertain_frfs_is_fitted_by_modes_as_close_as_its_sd_asks():
     ]
     mean, sd = np.mean(drawn, axis=0), np.std(drawn, axis=0)
     frf = CutterFrf("uncertain", lines, mean.transpose(1, 2, 0), sd.transpose(1, 2, 0))
-    modes = CutterFit.of(frf).modes
+    modes = CutterFit(frf).modes
     off = np.linalg.norm(modes.receptance(lines) - mean, axis=(1, 2))
     assert np.sqrt(np.mean((off / np.linalg.norm(mean, axis=(1, 2))) ** 2)) < 0.03
     assert len(modes.poles) < 20

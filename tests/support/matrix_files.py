@@ -9,9 +9,9 @@ import numpy as np
 
 from planner.export.uff import write_sets
 from planner.frf.matrix import FrfMatrix
+from planner.frf.synthesis import convert
 
 KINDS = {"accelerance": (12, "m/s^2"), "mobility": (11, "m/s"), "receptance": (8, "m")}
-TIMES = {"accelerance": 0, "mobility": 1, "receptance": 2}
 
 
 def write_matrix(
@@ -28,7 +28,7 @@ def write_matrix(
     Responses in `turned` (indices) are written along their negative direction.
     """
     number, unit = KINDS[kind]
-    w = 2j * np.pi * matrix.frequency_hz
+    h = convert(matrix.frequency_hz, matrix.accelerance, "accelerance", kind)
     sets = list(before)
     pairs = zip(*np.nonzero(matrix.measured), strict=True) if entries is None else entries
     for o, i in pairs:
@@ -38,7 +38,7 @@ def write_matrix(
                 "type": 58, "binary": 1, "func_type": 4, "id1": "simulated",
                 "rsp_node": int(felt.node), "rsp_dir": sign * felt.number,
                 "ref_node": int(hit.node), "ref_dir": hit.number,
-                "data": sign * matrix.accelerance[o, i] / w ** TIMES[kind],
+                "data": sign * h[o, i],
                 "x": matrix.frequency_hz, "abscissa_spacing": 1, "abscissa_spec_data_type": 18,
                 "ordinate_spec_data_type": number, "ordinate_axis_units_lab": unit,
                 "orddenom_spec_data_type": 13, "orddenom_axis_units_lab": "N", **fields,
