@@ -18,6 +18,7 @@ from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.hit_columns import PoseHits, no_columns
 from planner.robot.robot import Robot
 from tests.support.fitted_cases import COUNTED, LINES, Case, frac_of, one_thing
+from tests.support.true_modes import NOT_COUNTED, counted, true_modes
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,12 +83,13 @@ def lacking(
 
 
 @dataclass(frozen=True)
-class FrfScore:
-    """How predicted FRFs compare with true ones: means over unseen poses.
+class Score:
+    """How predicted FRFs and frequencies compare with true ones: means over unseen poses.
 
     `frac`: Global FRAC of the direct FRFs; `covered`: share of lines of all nine FRFs within 2 sd;
     `covered_low`, `covered_high`: of the lower and the upper half of the band; `alone`: Global FRAC
-    of the identified simulation by itself.
+    of the identified simulation by itself; `rmse`: of frequencies, in %; `inside`: share of them in
+    the 95 % intervals of a pose's mean over visits; `done`: whether the campaign would stop.
     """
 
     frac: float
@@ -95,9 +97,12 @@ class FrfScore:
     covered_low: float
     covered_high: float
     alone: float
+    rmse: float
+    inside: float
+    done: bool
 
     @classmethod
-    def of(cls, case: Case, model: Model) -> "FrfScore":
+    def of(cls, case: Case, model: Model) -> "Score":
         """Of a model at the unseen poses."""
         mean, sd = model.frf(case.unseen, case.lines_hz)
         inside = np.abs(mean - case.true_frf) <= 2 * sd
@@ -106,4 +111,13 @@ class FrfScore:
         if learned is not None:
             simulation = learned.identified.simulation
             alone = frac_of(case.true_frf, simulation.accelerance(case.unseen, case.lines_hz))
-        return cls(frac_of(case.true_frf, mean), float(inside.mean()), low, high, alone)
+        q = case.unseen
+        modes = model._predict(q, model.cell.features(q), model.low.frequencies(q), visit=False)
+        hz, most = modes.frequency_hz, modes.frequency_hz.shape[1] + NOT_COUNTED
+        seen = [true_modes(case.truth, one, most) for one in q]
+        true = np.array([counted(*one, f) for one, f in zip(seen, hz, strict=True)])
+        return cls(
+            frac_of(case.true_frf, mean), float(inside.mean()), low, high, alone,
+            100 * float(np.sqrt(np.mean((hz / true - 1) ** 2))),
+            float(np.mean(np.abs(hz - true) <= 1.96 * modes.frequency_sd_hz)), model.done,
+        )  # fmt: skip

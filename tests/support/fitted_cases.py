@@ -1,7 +1,6 @@
 """Robots of another engine that lack several things at once, hit as people hit; FRFs and truth."""
 
 import shutil
-import tomllib
 import zlib
 from collections.abc import Callable
 from copy import deepcopy
@@ -31,9 +30,8 @@ from planner.proof.model import Truth
 from planner.proof.scene import deviate, log_uniform, some_direction, triple
 from planner.robot.robot import Robot
 from tests.support.faulty_robots import (
-    ROBOTS,
+    ARMS,
     added,
-    known,
     links_moved,
     mass_that_moves,
     scattered,
@@ -45,10 +43,6 @@ from tests.support.true_modes import true_modes
 
 POSES, UNSEEN, LINES = 6, 8, 300
 ROUGH = replace(EVERYDAY, angle_deg=3.0, offset_m=0.005)
-ARMS = {
-    **{name: ROBOTS[name] for name in ("kr10", "irb6640", "arm of four", "kr240 plane")},
-    "kr210": lambda folder, rng: known("kr210", folder, rng),
-}
 HEAVIER = 0.02  # share of what moves that another tool weighs more
 COUNTED = 4  # natural frequencies that are compared, the lowest that hits show
 
@@ -245,7 +239,7 @@ def _measured(
     measured = struck_poses(truth, injected, q, hammer, arm.band_hz, errors, rng)
     lines = np.linspace(*arm.band_hz, LINES)
     true = np.array([truth.accelerance(one, lines) for one in unseen])
-    modes = [true_modes(truth, one, 12, True) for one in unseen]
+    modes = [true_modes(truth, one, 12) for one in unseen]
     seen = tuple(hz[np.asarray(shown)][:COUNTED] for hz, shown in modes)
     frfs = tuple(pose.one_hit_frf for pose in measured)
     return Case(
@@ -256,11 +250,9 @@ def _measured(
 
 
 def limits(arm: Arm, simulation: Simulation) -> tuple[np.ndarray, np.ndarray]:
-    table = tomllib.loads(arm.workspace)
-    limits = table.get("joints_deg")
-    if limits is None:
+    if arm.joints_deg is None:
         return simulation.robot.lower_rad * 0.4, simulation.robot.upper_rad * 0.4
-    low, high = np.deg2rad(np.array(limits, dtype=float)).T
+    low, high = np.deg2rad(np.array(arm.joints_deg, dtype=float)).T
     return low, high
 
 
