@@ -24,7 +24,7 @@ from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
 from planner.report.imports import how_to_answer
 from tests.support.case_campaigns import CaseCampaign
-from tests.support.fitted_cases import Case, everyday
+from tests.support.fitted_cases import Case, one_thing
 from tests.support.generated_arms import BAND_HZ, Arm, make_generated_arm
 
 OTHERS = 3  # poses of the workspace that are hit beside
@@ -126,7 +126,7 @@ POSES, LOUD = 3, 1.2
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory) -> Case:
-    return everyday("arm of four", 7002, tmp_path_factory.mktemp("case"))
+    return one_thing("arm of four", "soft base", 7002, tmp_path_factory.mktemp("case"))
 
 
 def test_another_tool_and_a_wrong_unit_are_asked_about_and_nothing_else(case):

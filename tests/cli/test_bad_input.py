@@ -282,7 +282,7 @@ def test_huge_files_are_refused_without_reading_them(bench, tmp_path):
     for suffix in ("uff", "mat", "csv"):
         huge = tmp_path / f"huge.{suffix}"
         with open(huge, "wb") as file:
-            file.truncate(2**30)
+            file.truncate(2**29 + 1)
         assert fault(call("modes", huge, "--json"), huge.name, "No modes") == ""
         assert fault(call("import", bench.cell, huge, "--pose", "G1")) == ""
     assert fault(call("predict", bench.cell, huge, "--json")) == ""
