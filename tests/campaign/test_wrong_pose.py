@@ -6,7 +6,8 @@ pose before: `pytest -m slow tests/campaign/test_wrong_pose.py`.
 
 import csv
 import re
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,28 +22,63 @@ from planner.campaign.model import Model
 from planner.campaign.pose_mismatch import known_poses
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import InjectedFaults
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import MeasurementErrors
+from planner.proof.model import Truth
 from planner.recording.folder import TABLE
 from planner.report.imports import how_to_answer
 from tests.support.case_campaigns import CaseCampaign
 from tests.support.fitted_cases import Case, one_thing
-from tests.support.generated_arms import BAND_HZ, Arm, make_generated_arm
+from tests.support.outside import HAMMER
+from tests.support.plain_arm import BAND_HZ, JOINTS_DEG, make_plain_arm, plain_campaign
+from tests.support.struck_poses import record_by_hand
 
 OTHERS = 3  # poses of the workspace that are hit beside
+ASKEW = MeasurementErrors(angle_deg=2.0, readback_deg=0.005)
+BOX_RAD = np.deg2rad(JOINTS_DEG)
 
 
-def measured(arm: Arm, folder, poses: int) -> Campaign:
-    campaign = Campaign.new(folder / "campaign", arm.robot_toml, arm.campaign_toml)
-    for number in range(poses):
-        (pose,) = campaign.next()
-        named = [(pose.pose, np.deg2rad(pose.joints_deg))]
-        (report,) = campaign.import_paths((arm.record(folder / pose.pose, named, number),))
-        assert report.question is None
-    return campaign
+@dataclass(frozen=True)
+class Arm:
+    """A campaign of a small arm, and its true robot, whose springs are off by some 15 %."""
+
+    campaign: Campaign
+    truth: Truth
+
+    @classmethod
+    def of(cls, folder: Path) -> "Arm":
+        robot = make_plain_arm(folder / "robot")
+        plan = plain_campaign(folder / "campaign.toml")
+        off = Deviation(923, stiffness=0.15, damping=0.1, inertia=0.04, com_m=0.003)
+        return cls(Campaign.new(folder / "campaign", robot, plan), load_truth(robot, off))
+
+    def record(self, folder: Path, poses: Mapping[str, np.ndarray], number: int) -> Path:
+        """Two hits an axis at each pose, in rad."""
+        stated = [(name, np.round(np.rad2deg(q), 4)) for name, q in poses.items()]
+        axes = [f"+{axis}" for axis in "xyz" for _ in range(2)]
+        rng = np.random.default_rng([923, number])
+        record_by_hand(folder, self.truth, InjectedFaults(Deviation()), ASKEW, stated, axes, HAMMER,
+                       rng)  # fmt: skip
+        return folder
 
 
-def measured_at(arm: Arm, folder, q: np.ndarray) -> list[MeasuredPose]:
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory) -> Arm:
+    """With one measured pose."""
+    folder = tmp_path_factory.mktemp("begun")
+    arm = Arm.of(folder)
+    (pose,) = arm.campaign.next()
+    made = arm.record(folder / "hits", {pose.pose: np.deg2rad(pose.joints_deg)}, 0)
+    (report,) = arm.campaign.import_paths((made,))
+    assert report.question is None
+    return arm
+
+
+def measured_at(arm: Arm, folder: Path, q: np.ndarray) -> list[MeasuredPose]:
     """What the hits at each of the poses q (n, dof) in rad give."""
-    made = arm.record(folder / "others", [(f"W{i}", row) for i, row in enumerate(q)], 9)
+    made = arm.record(folder, {f"W{i}": row for i, row in enumerate(q)}, 9)
     with open(made / TABLE, newline="") as file:
         rows = list(csv.DictReader(file))
     sources = {
@@ -53,12 +89,11 @@ def measured_at(arm: Arm, folder, q: np.ndarray) -> list[MeasuredPose]:
     return [measure(own, BAND_HZ) for own in sources.values()]
 
 
-def test_another_pose_is_asked_about_before_three_are_measured(tmp_path):
-    arm = make_generated_arm(tmp_path, 922, 4, 3)
-    campaign = measured(arm, tmp_path, 1)
-    q = np.random.default_rng(924).uniform(*arm.box_rad.T, (OTHERS, 4))
+def test_another_pose_is_asked_about_before_three_are_measured(begun, tmp_path):
+    campaign = begun.campaign
+    q = np.random.default_rng(924).uniform(*BOX_RAD.T, (OTHERS, 4))
     first = np.deg2rad(campaign.state.used[0].joints_deg)
-    *found, again = measured_at(arm, tmp_path, np.vstack([q, first]))
+    *found, again = measured_at(begun, tmp_path, np.vstack([q, first]))
 
     def asked(at: int, one: MeasuredPose):
         angles = tuple(np.rad2deg(q[at]).tolist())
@@ -77,12 +112,11 @@ def test_another_pose_is_asked_about_before_three_are_measured(tmp_path):
 
 def test_a_wrong_angle_at_the_first_pose_is_asked_about(tmp_path):
     """FRFs tell nothing then, for the simulation alone lacks too much: the setpoint does."""
-    arm = make_generated_arm(tmp_path, 923, 4, 3)
-    campaign = Campaign.new(tmp_path / "campaign", arm.robot_toml, arm.campaign_toml)
-    (pose,) = campaign.next()
-    folder = arm.record(tmp_path / "P001", [("P001", np.deg2rad(pose.joints_deg))], 0)
+    arm = Arm.of(tmp_path)
+    (pose,) = arm.campaign.next()
+    folder = arm.record(tmp_path / "P001", {"P001": np.deg2rad(pose.joints_deg)}, 0)
     read = other_sign(folder, "joint_4_deg")
-    (report,) = campaign.import_paths((folder,))
+    (report,) = arm.campaign.import_paths((folder,))
     asked = report.question
     assert asked is not None
     assert asked.about == "readback"
@@ -98,9 +132,8 @@ def test_how_an_angle_of_a_pose_before_is_corrected(tmp_path):
     assert "--pose P001c" in own
 
 
-def test_other_commands_take_poses_where_they_stood(tmp_path, monkeypatch):
-    arm = make_generated_arm(tmp_path, 922, 4, 3)
-    campaign = measured(arm, tmp_path, 1)
+def test_other_commands_take_poses_where_they_stood(begun, monkeypatch):
+    campaign = begun.campaign
     stated = np.deg2rad(campaign.state.used[0].joints_deg)
     assert all(np.array_equal(r.q, stated) for r in campaign.used_recordings)
     monkeypatch.setattr(LowFidelity, "stood", lambda self, q: q + 0.1)
