@@ -9,11 +9,8 @@ import pytest
 from rich.console import Console
 
 from planner.campaign.campaign import Campaign
-from planner.proof.deviation import Deviation
-from planner.proof.load import load_truth
 from planner.session.watch import SessionSummary, watch
-from tests.support.outside import record
-from tests.support.plain_arm import make_plain_arm, plain_campaign
+from tests.support.outside import make_cell, record
 
 
 class Script:
@@ -71,10 +68,8 @@ def cell(first_pose, tmp_path):
 def measured_once(tmp_path_factory):
     """A campaign of three poses, and the robot's truth: to be copied."""
     root = tmp_path_factory.mktemp("measured")
-    robot = make_plain_arm(root / "robot")
-    off = Deviation(seed=3, stiffness=0.12, damping=0.1, inertia=0.04, com_m=0.003)
-    truth = load_truth(robot, off)
-    campaign = Campaign.new(root / "cell", robot, plain_campaign(root / "campaign.toml"))
+    robot, campaign_toml, truth = make_cell(root)
+    campaign = Campaign.new(root / "cell", robot, campaign_toml)
     for number in range(3):
         pose = campaign.next()[0]
         folder = record(truth, root / f"made{number}", pose.pose, pose.joints_deg, number)
