@@ -1,4 +1,4 @@
-"""What every test shares: one BLAS thread, real recordings where they are present, --table."""
+"""What every test shares: one BLAS thread, real recordings where they are present."""
 
 import os
 
@@ -11,7 +11,6 @@ import pytest  # noqa: E402
 
 from planner.inference import parallel  # noqa: E402
 
-pytest_plugins = ["tests.support.proof_table"]
 SHARED_DATA = Path(__file__).parents[2] / "shared" / "data"
 
 

@@ -27,7 +27,6 @@ from .data import LEFT, RIGHT
 PARTS = 16  # parameters of a mode
 MOST = 3  # tasks of a group
 LOW_MODES = 5  # modes 1 to 5 are of low frequency
-PAPER_MODELS = 70
 
 
 def groups(labels: np.ndarray, reference: np.ndarray) -> list[np.ndarray]:

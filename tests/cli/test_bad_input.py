@@ -151,20 +151,11 @@ BAND = "band_hz = [5.0, 110.0]"
 # What is wrong in a file, and a part of the sentence that says so; test_robot_config.py has more.
 CONFIGURATIONS = {
     "robot/robot.toml": {
-        "no urdf": (replaced('urdf = "arm.urdf"\n', ""), "urdf is missing; add it."),
         "urdf of no file system": (
             replaced('urdf = "arm.urdf"', 'urdf = "a\\u0000.urdf"'),
             "correct the entry urdf",
         ),
-        "stiffness a word": (
-            replaced(STIFF, 'stiffness = "high"'),
-            "[[compliance]] stiffness must be a number, not",
-        ),
         "number without end": (replaced(STIFF, f"stiffness = {'6' * 5000}"), "thousands of digits"),
-        "key misspelt": (
-            replaced("damping = ", "dampening = ", 1),
-            '[[compliance]] has no entry "dampening"; "damping" may be meant.',
-        ),
         "half": (lambda text: text[: len(text) // 2].rsplit("=", 1)[0], "robot.toml"),
         "nothing elastic": (lambda text: text.split("[[compliance]]")[0], "compliance"),
         "empty": (lambda text: "", "is missing; add it."),
@@ -176,12 +167,9 @@ CONFIGURATIONS = {
     "plan/campaign.toml": {
         "key misspelt": (replaced("cou", "cuo"), '[modes] has no entry "cuont"; "count" may be'),
         "table misspelt": (replaced("[modes]", "[mdes]"), 'no entry "mdes"; "modes" may be meant.'),
-        "unknown table": (lambda text: text + "[surprise]\nx = 1\n", "surprise"),
         "a word": (replaced("count = 4", 'count = "four"'), "must be a whole number, not"),
-        "number without end": (replaced("count = 4", f"count = {'4' * 5000}"), "thousands"),
         "no mode": (replaced("count = 4", "count = 0"), "[modes] count"),
         "five joints": (replaced("[[-40, 40], ", "["), "5 ranges"),
-        "a range of words": (replaced("[[-40, 40]", '[["a", 40]'), "joints_deg must be a number"),
         "beyond a limit": (
             replaced("[-40, 40]", "[-400, 40]"),
             "limits are -170.0° to 170.0°; narrow",
@@ -203,7 +191,6 @@ CONFIGURATIONS = {
             "names no pose",
         ),
         "axis of length 2": (with_tool_axis("[0.0, 0.0, -2.0]"), "tool_axis is no unit vector"),
-        "axis of length 0": (with_tool_axis("[0.0, 0.0, 0.0]"), "tool_axis is no unit vector"),
         "no end": (added("[goal]\njoints_deg = [[0, inf, 0, 0, 0, 0]]"), "joints_deg"),
         "empty": (lambda text: "", "is missing; add it."),
     },
@@ -255,8 +242,6 @@ COMMANDS = {
     "new CELL --robot ROOT/robot/robot.toml": "",
     "new ROOT/fresh": "--example",
     "new": "see planner new --help.",  # a missing argument points to the command's own help
-    "import": "see planner import --help.",
-    "check": "see planner check --help.",
     "study seed-9": "choose one of busch2022",
     "study seyedhosseini2025 --out POSES": "name another folder",
     "frobnicate": "",
@@ -282,7 +267,7 @@ def test_huge_files_are_refused_without_reading_them(bench, tmp_path):
     for suffix in ("uff", "mat", "csv"):
         huge = tmp_path / f"huge.{suffix}"
         with open(huge, "wb") as file:
-            file.truncate(2**30)
+            file.truncate(2**29 + 1)
         assert fault(call("modes", huge, "--json"), huge.name, "No modes") == ""
         assert fault(call("import", bench.cell, huge, "--pose", "G1")) == ""
     assert fault(call("predict", bench.cell, huge, "--json")) == ""

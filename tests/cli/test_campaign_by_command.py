@@ -177,7 +177,7 @@ def test_what_another_acquisition_would_have_proposed_and_saved(tmp_path):
     robot, campaign_toml, truth = make_cell(tmp_path, learns=False)
     cell, measured = tmp_path / "cell", []
     told("new", cell, "--robot", robot, "--campaign", campaign_toml)
-    for number in range(5):
+    for number in range(4):
         proposal, _ = outside.measured(truth, cell, tmp_path / f"export{number}", number)
         measured.append(proposal["pose"])
     replayed = told("replay", cell, "--acquisition", "variance")

@@ -46,21 +46,12 @@ def done(cell, tmp_path_factory):
     return answer, out
 
 
-def test_the_answer_has_every_documented_key(done):
-    answer, _ = done
-    assert {"parameters", "fit", "held_out", "seconds"} <= set(answer)
-    keys = {"joint", "axis", "stiffness", "stiffness_sd", "damping", "identifiable"}
-    assert all(keys <= set(entry) for entry in answer["parameters"])
-    assert [e["joint"] for e in answer["parameters"]] == [f"joint_a{i}" for i in range(1, 7)]
-    assert answer["held_out"]["poses"]
-    assert answer["simulated"]
-
-
 def test_springs_are_found_within_their_sds(cell, done):
     """Off by 20 % before, with inertias that are off too, from records that cut decays off."""
     _, _, truth = cell
     for entry, spring in zip(done[0]["parameters"], truth.springs, strict=True):
         assert entry["identifiable"]
+        assert entry["joint"] == spring.joint
         assert entry["stiffness_sd"] < 0.01 * spring.stiffness
         assert abs(entry["stiffness"] - spring.stiffness) < 4 * entry["stiffness_sd"]
         assert abs(entry["damping"] - spring.damping) < 4 * entry["damping_sd"]
@@ -68,6 +59,7 @@ def test_springs_are_found_within_their_sds(cell, done):
 
 def test_poses_that_were_held_out_agree(done):
     answer, _ = done
+    assert answer["held_out"]["poses"]
     assert answer["held_out"]["frac"] > 0.99 > answer["held_out"]["before"]["frac"]
     assert answer["fit"]["frac"] > 0.99
     assert answer["held_out"]["frobenius"] > answer["held_out"]["before"]["frobenius"]

@@ -155,7 +155,6 @@ EXACT = Deviation(0, stiffness=0, damping=0, inertia=0, com_m=0)
 # Of a joint's stiffness and its angle under a middling hit.
 LAWS: dict[str, Callable[[float, float], JointLaw]] = {
     "hardening": lambda k, angle: Hardening(0.8 * k, 0.5 * angle),
-    "softening": lambda k, angle: Hardening(-0.4 * k, 0.5 * angle),
     "friction": lambda k, angle: Friction(0.5 * k, 0.1 * k * angle),
     "backlash": lambda k, angle: Backlash(0.5 * k, 0.3 * angle),
 }

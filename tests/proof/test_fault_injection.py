@@ -50,15 +50,6 @@ def measured(truth: Truth, injected: InjectedFaults | None = None, **hammer: flo
     return frfs(truth, injected, [once(Q, 1000.0)], replace(QUIET, **hammer), BAND)[1][0]
 
 
-def test_frfs_of_hits_are_the_linear_accelerance(path):
-    truth = load_truth(path)
-    f, H = frfs(
-        truth, InjectedFaults(Deviation()), [once(Q, 1000.0)], replace(QUIET, record_s=20.0), BAND
-    )
-    exact = truth.accelerance(Q, f)
-    assert np.max(np.abs(H[0] - exact)) < 1e-3 * np.max(np.abs(exact))
-
-
 RIPPLE = StiffnessRipple("joint_3", 2, 0.3, -0.1)
 # What scatters, and by how much the stiffness of each joint changes at q.
 CHANGES = {

@@ -25,7 +25,6 @@ def table_mutations(lines: list[str]) -> dict[str, bytes]:
         "empty": b"",
         "header only": text(lines[:1]),
         "binary junk": bytes(range(256)) * 20,
-        "latin-1": "pose,größe\nx,1\n".encode("latin-1"),
         "no header": text(lines[1:]),
         "cut in a row": whole[: len(whole) // 2].rsplit(b",", 1)[0] + b"\n",
         "extra cell": text([lines[0], lines[1] + ",9", *lines[2:]]),
@@ -73,7 +72,6 @@ def hit_file_mutations(good: bytes) -> dict[str, bytes]:
     found = {
         "empty": b"",
         "binary junk": np.random.default_rng(7).bytes(5000),
-        "text": b"this is no recording\n" * 30,
         "nan samples": good[:half] + b"\xff" * 64 + good[half + 64 :],
         "zeros": b"\x00" * 4000,
     }

@@ -1,23 +1,15 @@
-"""Cells hit as people hit, on true robots (MuJoCo), and what a measuring chain may do wrong."""
+"""What a measuring chain may do wrong to the hits of a true robot."""
 
 import warnings
-import zlib
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pyuff
 from scipy.spatial.transform import Rotation
 
-from planner.campaign.cell import Cell as CampaignCell
 from planner.campaign.chain_faults import ChainFault
 from planner.campaign.chain_mismatch import LOG_ODDS, HitSums, hit_sums, most_probable
-from planner.campaign.config import load_campaign_config
-from planner.campaign.imported_files import sort_paths
-from planner.dataset.measure import MeasuredPose
-from tests.support.everyday_campaigns import Cell, decisions, in_turn
-from tests.support.faulty_robots import ROBOTS, lacking
+from tests.support.case_campaigns import CaseCampaign
 
 FACTORS = {
     "× 1000": 1e3,
@@ -31,38 +23,16 @@ SLIGHTEST = "× 2", "÷ 2", "a channel × 2"
 FAULTS = (*FACTORS, "a channel × 2", "turned by 90°", "swapped axes", "wrong sign", "force's sign")
 
 
-@dataclass(frozen=True, eq=False)
-class Struck:
-    """A robot's poses in the order of measuring; `kind` is what its simulation lacks."""
-
-    robot: str
-    kind: str
-    sums: tuple[HitSums, ...]
-
-
-def struck(folder: Path, seed: int, poses: int) -> Struck:
-    """A robot of those for everyday campaigns in turn, hit at poses of its workspace."""
-    name, kind = in_turn(seed)
-    rng = np.random.default_rng([seed, zlib.crc32(name.encode())])
-    robot = ROBOTS[name](folder, rng)
-    injected, _ = lacking(kind, robot, rng)
-    true = Cell.of(robot, injected, rng)
-    config = decisions(robot, folder / "campaign.toml", 3, 30)
-    cell = CampaignCell.load(robot.toml, load_campaign_config(config))
-    assert cell.simulation is not None
-    joints = cell.robot.joints
+def sums_of(campaign: CaseCampaign, poses: int) -> list[HitSums]:
+    """Of the first poses of a case, whose chain is right."""
     found = []
-    for number, q in enumerate(rng.permutation(cell.candidates.q)[:poses]):
-        stated = tuple(np.round(joints.shown(q), 4).tolist())
-        said = true.record(folder / f"hits{number}", f"P{number}", stated)
-        [delivery] = sort_paths((said,), cell.robot, None, None)
-        frf = MeasuredPose(delivery.sources, robot.band_hz).frf
-        assert frf is not None
-        q, frf = joints.internal(stated), frf.within(robot.band_hz)
-        one = hit_sums(cell.simulation, cell.tolerances, q, frf)
+    for q, pose in zip(campaign.case.q[:poses], campaign.case.measured, strict=False):
+        assert campaign.cell.simulation is not None
+        frf = pose.frf.within(campaign.case.band_hz)
+        one = hit_sums(campaign.cell.simulation, campaign.cell.tolerances, q, frf)
         assert one is not None
         found.append(one)
-    return Struck(name, kind, tuple(found))
+    return found
 
 
 def shown_by(sums: HitSums, matrix: np.ndarray) -> HitSums:
@@ -90,13 +60,6 @@ def judged(sums: HitSums) -> ChainFault | None:
     """What is asked about; None: nothing."""
     found, gain = most_probable(sums)
     return found if gain >= LOG_ODDS else None
-
-
-def cases(folder: Path, seeds: range, poses: int) -> Iterator[Struck]:
-    """Of all seeds."""
-    for seed in seeds:
-        (folder / str(seed)).mkdir(parents=True)
-        yield struck(folder / str(seed), seed, poses)
 
 
 def scaled(row, folder, factor: float):

@@ -1,15 +1,15 @@
-"""A small campaign that is killed and starved of disk: what is lost, and what is said.
+"""A small campaign that is killed and has no room on its disk: what is lost, and what is said.
 
 A script of its own: `python -m tests.support.crash_lab ROOT --kills 500 --full 50`.
 Each trial is one line of ROOT/KIND.jsonl; started again, it goes on after the last.
 """
 
 import argparse
+import errno
 import json
 import os
 import shutil
 import signal
-import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -33,7 +33,7 @@ from tests.support.plain_arm import JOINTS_DEG, make_plain_arm, plain_campaign
 
 ENOUGH = 5  # measured poses, after which a campaign is replayed and another begun
 LATEST_S, MOST_CHANGES = 1.2, 150  # of a command's life; beyond, most have ended
-DISK, PAGE = "64m", 4096
+LARGEST_FILE = 2**16  # bytes of a disk that takes no large file
 
 # What a second time has nothing left to act upon, where the first one was done before the end.
 DONE_ONCE = ("new", "skip", "withdraw", "undo")
@@ -233,28 +233,21 @@ def others(cell: Cell) -> list[Command]:
 
 
 def starve(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
-    """One command on a disk that is nearly full, or read-only; then again with room."""
-    disk, filler = cell.root, cell.root / "filler"
+    """One command on a disk that is full or read-only from some change on, or takes no large file;
+    then again with room."""
     if cell.played:
         shutil.rmtree(cell.campaign)
-        shutil.rmtree(cell.root / "exports")  # which would fill the disk in the end
     shutil.rmtree(cell.root / "out", ignore_errors=True)
     (cell.root / "out").mkdir()
     command = cell.command(rng)
     if rng.random() < 0.3 and cell.log.exists() and cell.state().used:
         more = others(cell)
         command = more[int(rng.choice(len(more)))]
-    before, read_only = entries(cell), bool(rng.random() < 0.2)
-    pages = int(np.exp(rng.uniform(0, np.log(100))))
-    if read_only:
-        subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
-    else:
-        _fill(filler, pages)
+    before, change = entries(cell), int(np.exp(rng.uniform(0, np.log(MOST_CHANGES))))
+    why = int(rng.choice([errno.ENOSPC, errno.EROFS, errno.EFBIG]))
     watching = 1.5 if command[0] == "watch" else 0.0
-    outcome = forked(doing(command), log, after_s=watching)
-    if read_only:
-        subprocess.run(["mount", "-o", "remount,rw", disk], check=True)
-    filler.unlink(missing_ok=True)
+    room = {"largest": LARGEST_FILE} if why == errno.EFBIG else {"at_change": change, "full": why}
+    outcome = forked(doing(command), log, after_s=watching, **room)
     faults = outcome.faults((0, 2, 3)) + lost(cell, before, command, outcome)
     said = outcome.err.strip().splitlines()
     if outcome.code == 2 and len(said) != 1 and not watching:  # whose page goes there too
@@ -264,17 +257,7 @@ def starve(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
     codes = (0, 3, 2) if outcome.code == 0 else (0, 3)
     faults += again.faults(codes) + lost(cell, before, command, again)
     return {"command": command[:1], "code": outcome.code, "said": outcome.err.strip()[:200],
-            "pages": 0 if read_only else pages, "faults": faults}  # fmt: skip
-
-
-def _fill(filler: Path, pages: int) -> None:
-    """Leave so many pages of the disk."""
-    with open(filler, "wb", buffering=0) as file:
-        try:
-            while True:
-                file.write(bytes(PAGE))
-        except OSError:
-            file.truncate(max(0, file.tell() - pages * PAGE))
+            "why": errno.errorcode[why], "change": change, "faults": faults}  # fmt: skip
 
 
 TRIALS = {"kills": kill, "stopped": interrupt, "full": starve}
@@ -291,10 +274,8 @@ def trials(root: Path, kind: str, count: int, seed: int) -> Iterator[dict]:
         return
     disk = folder / "disk"
     disk.mkdir(exist_ok=True)
-    if kind == "full":
-        subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={DISK}", "tmpfs", disk], check=True)
     cell = Cell(disk).make()
-    os.environ["XDG_CACHE_HOME"] = str((root if kind != "full" else disk) / "cache")
+    os.environ["XDG_CACHE_HOME"] = str(root / "cache")
     for number in range(len(done), count):
         found = TRIALS[kind](cell, np.random.default_rng([seed, number]), folder)
         with open(kept, "a") as file:

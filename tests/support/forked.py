@@ -81,11 +81,14 @@ def forked(
     at_change: int = 0,
     after_s: float = 0.0,
     signal_sent: int = signal.SIGKILL,
+    full: int = 0,
+    largest: int = 0,
 ) -> Outcome:
     """Run `act` in a child whose words go to `folder`.
 
-    It is sent a signal before its `at_change`-th change of the disk, and killed after so many
-    seconds; 0: never.
+    It is sent a signal before its `at_change`-th change of the disk, or each from there on fails
+    with the error `full`; it is killed after so many seconds; no file grows beyond `largest` bytes.
+    0: never.
     """
     names = folder / "out", folder / "err"
     child = os.fork()
@@ -98,8 +101,10 @@ def forked(
             os.setsid()
             resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
             signal.signal(signal.SIGINT, signal.default_int_handler)
+            if largest:
+                resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
             if at_change:
-                _die_at(at_change, signal_sent)
+                _stop_at(at_change, signal_sent, full)
             code = act()
             sys.stdout.flush()
             sys.stderr.flush()
@@ -119,12 +124,14 @@ def forked(
     return Outcome(os.waitstatus_to_exitcode(status), out, err, cpu, used.ru_maxrss / 2**20, hung)
 
 
-def _die_at(change: int, signal_sent: int) -> None:
-    """A signal before the `change`-th time that this process changes or syncs the disk."""
+def _stop_at(change: int, signal_sent: int, full: int) -> None:
+    """A signal, or errors, from the `change`-th time that this process changes the disk."""
     left = [change]
 
     def count() -> None:
         left[0] -= 1
+        if full and left[0] <= 0:
+            raise OSError(full, os.strerror(full))
         if not left[0]:
             os.kill(os.getpid(), signal_sent)
 

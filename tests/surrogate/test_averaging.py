@@ -56,6 +56,7 @@ def brute_force(training, samples=20000):
         means.append(cross.T @ solved[:, 0])
         variances.append(np.diag(cov(r, low(r), r, low(r))) - np.sum(cross * solved[:, 1:], 0))
     w = np.exp(np.array(log_weight) - np.max(log_weight))
+    evidence = np.log(np.mean(w)) + np.max(log_weight) - len(x) / 2 * np.log(2 * np.pi)
     w /= w.sum()
     mean = w @ np.array(means)
     second = w @ (np.array(variances) + (np.array(means) - mean) ** 2)
@@ -65,7 +66,7 @@ def brute_force(training, samples=20000):
         centre, sd = low(r) + np.array(means), np.sqrt(np.maximum(variances, 1e-18))
         return w @ (norm.cdf((upper - centre) / sd) - norm.cdf((lower - centre) / sd))
 
-    return low(r) + mean, np.sqrt(second), 1 / np.sum(w**2), inside
+    return low(r) + mean, np.sqrt(second), 1 / np.sum(w**2), inside, evidence
 
 
 @pytest.mark.parametrize(("n", "seed"), [(3, 1), pytest.param(6, 2, marks=pytest.mark.slow)])
@@ -73,8 +74,9 @@ def test_few_samples_stand_for_twenty_thousand(n, seed):
     training = problem(n, seed)
     fitted = fit_ar1(FusionData(training, (PRIOR,), (PRIOR,), np.zeros(1)), 256, 32)
     mean, sd = (a[:, 0] for a in fitted.predict(QUERY, low(QUERY)))
-    exact_mean, exact_sd, effective, inside = brute_force(training)
+    exact_mean, exact_sd, effective, inside, evidence = brute_force(training)
     assert effective > 300  # else brute force itself would prove nothing
+    assert fitted.log_evidence == pytest.approx(evidence, abs=0.1)
     assert np.max(np.abs(mean - exact_mean) / exact_sd) < 0.15
     # At three points the exact sd hangs on rare, steep samples; what an engineer reads is the
     # interval, and that has to hold the probability it claims.

@@ -95,23 +95,6 @@ def test_ar1_nargp_follows_a_bent_relation_that_ar1_cannot():
     assert off[0] < 0.25 * off[1]
 
 
-def test_evidence_is_the_integral_over_the_prior():
-    """Against plain draws from the prior, with own formulas."""
-    s = samples(5, sd=0.1)
-    rng = np.random.default_rng(0)
-    scale, centre = np.std(s.y), np.mean(s.y)
-    y, noise = (s.y - centre) / scale, s.sd / scale
-    logs = []
-    for _ in range(20000):
-        sigma, nugget = np.exp(rng.standard_normal()), 1e-3 * np.exp(rng.standard_normal())
-        scaled = s.x / (0.8 * 2**0.5 * np.exp(0.8 * rng.standard_normal(2)))
-        r = np.sqrt(5 * np.sum((scaled[:, None] - scaled[None]) ** 2, axis=-1))
-        k = sigma**2 * (1 + r + r**2 / 3) * np.exp(-r) + 1 + np.diag(noise**2 + nugget**2)
-        logs.append(-0.5 * (y @ np.linalg.solve(k, y) + np.linalg.slogdet(2 * np.pi * k)[1]))
-    expected = np.log(np.mean(np.exp(logs)))
-    assert fit_averaged(s).model.log_evidence[0] == pytest.approx(expected, abs=0.1)
-
-
 def points(n, seed=0):
     x = np.random.default_rng(seed).random((n, 2))
     return Samples.of(x, np.sin(5 * x[:, 0]) + x[:, 1] ** 2 + 7.0)
@@ -137,21 +120,6 @@ def test_many_points_are_fitted_as_likely_as_if_all_were_climbed_from_afar():
     few = fit_likelihood(Samples.of(x[:30], s.y[:30]))
     there = at_hyperparameters(s, "rbf", few.theta, grown.units)
     assert grown.log_likelihood > there.log_likelihood + 1
-
-
-def test_no_neighbour_of_the_hyperparameters_is_likelier():
-    s = points(12)
-    fitted = fit_likelihood(s, "rbf", noise=0.1)
-    y = (s.y - fitted.units.centre) / fitted.units.scale
-
-    def value(theta):
-        k = parse("rbf", 2).covariance(np, theta, s.x, s.x) + 0.01 * np.eye(12)
-        return multivariate_normal(np.zeros(12), k).logpdf(y)
-
-    best = value(fitted.theta)
-    for i in (0, 2, 3):
-        for step in (-0.05, 0.05):
-            assert value(fitted.theta + step * (np.arange(4) == i)) < best
 
 
 def test_an_isotropic_kernel_has_one_length_scale_and_a_lower_peak():
