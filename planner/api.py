@@ -172,15 +172,12 @@ def diagnose(
 
 
 def diagnose_source(
-    given: RecordingsSource, robot: Robot | None = None, progress: ProgressCallback = no_progress
+    given: RecordingsSource, progress: ProgressCallback = no_progress
 ) -> DiagnosisReport:
-    """As `diagnose`, of what a folder of recordings or a campaign holds.
-
-    `robot` is the one of `given`, where it was loaded already.
-    """
-    robot = robot or given.nominal
-    dataset = given.read(robot, robot.config.band_hz, lambda text, share: progress(text, 0.0))
-    return diagnose(dataset, robot, offered=given.offered, progress=progress)
+    """As `diagnose`, of what a folder of recordings or a campaign holds."""
+    band_hz = given.robot.config.band_hz
+    dataset = given.read(band_hz, lambda text, share: progress(text, 0.0))
+    return diagnose(dataset, given.robot, offered=given.offered, progress=progress)
 
 
 def _frf_of(dataset: Dataset, pose: str | None) -> Frf:

@@ -20,57 +20,49 @@ from planner.robot.robot import Robot
 
 @dataclass(frozen=True, eq=False)
 class RecordingsSource:
-    """Recordings, robot.toml, the analyser's window rate, and poses that could be measured next.
+    """Recordings, their robot, the analyser's window rate, and poses that could be measured next.
 
     `recordings` is their folder, in which a `campaign` keeps its own. `offered` are joint angles
     (dof,) in rad by name; empty where none are known.
     """
 
     recordings: Path
-    robot: Path
+    robot: Robot
     window_rate_1_s: float
     offered: Mapping[str, np.ndarray]
     campaign: Campaign | None = None
 
     @property
-    def nominal(self) -> Robot:
-        """The robot as stated, a campaign's with what campaign.toml adds."""
-        own = self.campaign is not None and self.robot == self.campaign.robot_toml
-        return self.campaign.cell.robot if self.campaign and own else Robot.load(self.robot)
-
-    def listed(self, robot: Robot) -> tuple[Recording, ...]:
+    def listed(self) -> tuple[Recording, ...]:
         """Every file with its pose, in the order of recording; a campaign's accepted ones.
 
         Raises InputError where there are none, or a table is wrong.
         """
         if self.campaign is None:
-            return recordings_in(self.recordings, robot.joints, robot.points)
+            return recordings_in(self.recordings, self.robot.joints, self.robot.points)
         return self.campaign.used_recordings
 
     def unlisted(self, listed: Sequence[Recording]) -> tuple[str, ...]:
         """Which folders are left out because no table lists their recordings, in a sentence."""
         return () if self.campaign else unlisted_folders(self.recordings, listed)
 
-    def read(
-        self, robot: Robot, band_hz: tuple[float, float], progress: ProgressCallback
-    ) -> Dataset:
+    def read(self, band_hz: tuple[float, float], progress: ProgressCallback) -> Dataset:
         """What is `listed`, read and screened; nothing is written. Raises as `Dataset.of` does."""
         how = {"window_rate_1_s": self.window_rate_1_s, "progress": progress}
         if self.campaign is not None:
             return self.campaign.dataset(band_hz, **how)
-        return Dataset.read(self.recordings, robot, band_hz, **how)
+        return Dataset.read(self.recordings, self.robot, band_hz, **how)
 
     def with_poses(self, rows: tuple[PoseRow, ...]) -> "RecordingsSource":
         """The same with the poses of a table, unless a campaign offers its own."""
-        joints = self.nominal.joints
-        listed = {row.pose: joints.internal(row.joints_deg) for row in rows}
+        listed = {row.pose: self.robot.joints.internal(row.joints_deg) for row in rows}
         return replace(self, offered=self.offered or listed)
 
 
 def recordings_source(folder: Path, robot: Path | None, window_rate_1_s: float) -> RecordingsSource:
     """Of recordings as `recordings_in` takes them, or of a campaign.
 
-    Robot, window and poses are then its own.
+    Robot, window and poses are then its own, the robot with what campaign.toml adds.
 
     Raises InputError where the robot is missing.
     """
@@ -78,12 +70,13 @@ def recordings_source(folder: Path, robot: Path | None, window_rate_1_s: float) 
         if robot is None:
             raise InputError(f"{folder} is no campaign; name the robot with --robot ROBOT_TOML.")
         recordings = folder.parent if folder.name == TABLE else folder
-        return RecordingsSource(recordings, robot, window_rate_1_s, {})
+        return RecordingsSource(recordings, Robot.load(robot), window_rate_1_s, {})
     campaign = Campaign(folder)
     cell = campaign.cell
     chosen = np.flatnonzero(cell.allowed)[:MOST_INFORMED]
     offered = {f"candidate {i + 1}": cell.candidates.q[i] for i in chosen}
-    path = robot or campaign.robot_toml
+    own = robot is None or robot == campaign.robot_toml
+    loaded = cell.robot if own else Robot.load(robot)
     rate = window_rate_1_s or cell.config.modes.window_rate_1_s
     recordings = campaign.directory / store.RECORDINGS
-    return RecordingsSource(recordings, path, rate, offered, campaign)
+    return RecordingsSource(recordings, loaded, rate, offered, campaign)

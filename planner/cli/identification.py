@@ -132,12 +132,12 @@ def identify(
     check_options(band_hz, window_rate_1_s=window_rate_1_s)
     pictures = Pictures(plot, format_, rrd)
     given = recordings_source(recordings, robot, window_rate_1_s)
-    nominal = given.nominal
+    nominal = given.robot
     if out is not None:
         check_target(out, nominal)
     band = band_hz or nominal.config.band_hz
     with progress_bar("identifying", quiet=as_json) as progress:
-        dataset = given.read(nominal, band, progress)
+        dataset = given.read(band, progress)
         answer = fit(
             dataset,
             nominal,
@@ -175,10 +175,10 @@ def diagnose(
     started = time.perf_counter()
     check_options(window_rate_1_s=window_rate_1_s)
     given = recordings_source(recordings, robot, window_rate_1_s)
-    nominal = given.nominal
+    nominal = given.robot
     wanted = read_poses(predict, nominal.joints) if predict else ()
     with progress_bar("diagnosing", quiet=as_json) as progress:
-        answer = diagnose_source(given.with_poses(wanted), nominal, progress)
+        answer = diagnose_source(given.with_poses(wanted), progress)
         if predict:
             q = nominal.joints.internal([row.joints_deg for row in wanted])
             beside = given.recordings.absolute().parent / "predictions"
@@ -245,8 +245,7 @@ def compare(
     if simulation not in (None, *SIMULATIONS):
         raise InputError(f"--simulation {simulation} is not known; give {', '.join(SIMULATIONS)}.")
     given = recordings_source(recordings, robot, 0.0)
-    loaded = given.nominal
-    listed = given.listed(loaded)
+    loaded, listed = given.robot, given.listed
     if campaign is None and given.campaign is not None:
         campaign = given.campaign.directory / store.CONFIG
     config = comparison_config(loaded, listed, campaign, simulation)

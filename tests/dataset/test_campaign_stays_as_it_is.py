@@ -46,8 +46,7 @@ def campaign(tmp_path_factory):
 def test_recordings_in_use_and_nothing_else(campaign):
     before = content(campaign.directory)
     given = recordings_source(campaign.directory, None, 0.0)
-    robot = campaign.cell.robot
-    recorded = given.read(robot, campaign.cell.config.modes.band_hz, no_progress)
+    recorded = given.read(campaign.cell.config.modes.band_hz, no_progress)
     assert len(recorded.ended_frfs) == len(recorded.modes) == len(recorded.visits) == 2
     used = campaign.state.used
     assert recorded.poses == tuple(m.pose for m in used)
