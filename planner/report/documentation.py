@@ -1,18 +1,61 @@
-"""Every entry of the TOML files that a user writes (`schema`), and the manual."""
+"""Every entry of the TOML files that a user writes (`schema`), told by the types that read them.
 
-from collections.abc import Sequence
-from dataclasses import astuple
+And the manual.
+"""
+
+import inspect
+from collections.abc import Iterator, Sequence
+from dataclasses import astuple, dataclass
 
 import msgspec
+from msgspec import inspect as types
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planner.campaign.file_entries import FILES, tables_of
+from planner.campaign.config import AcquisitionTable, CampaignConfig, SurrogateTable
 from planner.campaign.store import EXAMPLE
 from planner.errors import InputError
+from planner.milling.cut import Cut
+from planner.milling.tool import ToolTable
 from planner.report.answer import Done
 from planner.report.html import rendered
 from planner.report.text import table
+from planner.robot.config import RobotConfig
+
+FILES: dict[str, type[msgspec.Struct]] = {
+    "robot": RobotConfig, "campaign": CampaignConfig, "cut": Cut, "tool": ToolTable,
+}  # fmt: skip
+REQUIRED = "required"
+
+
+@dataclass(frozen=True)
+class SchemaEntry:
+    """One entry: what it takes, and what holds where it is left out."""
+
+    name: str
+    takes: str
+    default: str
+
+
+@dataclass(frozen=True)
+class SchemaChoice:
+    """A name that an entry takes, and what it stands for."""
+
+    name: str
+    about: str
+
+
+@dataclass(frozen=True)
+class SchemaTable:
+    """A table of a file; "" for what stands at its top. `about` may have several sentences.
+
+    `choices` are what its `name` or `model` may be, where that is one of several.
+    """
+
+    name: str
+    about: str
+    entries: tuple[SchemaEntry, ...]
+    choices: tuple[SchemaChoice, ...] = ()
 
 
 def schema(file: str) -> Done:
@@ -47,3 +90,93 @@ def manual(commands: Sequence[tuple[str, str]]) -> str:
         paragraphs = [one for one in said.split("\n\n") if one.strip()]
         told.append((name, paragraphs, " ".join(example.split())))
     return rendered("manual.html", title="planner: manual", files=files, commands=told)
+
+
+def tables_of(kind: type[msgspec.Struct], name: str = "") -> Iterator[SchemaTable]:
+    """The table of a type, then those of its entries that are tables themselves."""
+    info = types.type_info(kind)
+    assert isinstance(info, types.StructType)
+    entries, inner = [], []
+    for field in info.fields:
+        struct, form = _struct(field.type)
+        if struct is None:
+            entries.append(SchemaEntry(field.encode_name, _takes(field.type), _default(field)))
+        else:
+            path = f"{name.strip('[]')}.{field.encode_name}".strip(".")
+            inner.append((struct, form.format(path)))
+    about = " ".join((inspect.getdoc(kind) or "").split())
+    yield SchemaTable(name, about, tuple(entries), _choices(kind))
+    for struct, path in inner:
+        yield from tables_of(struct, path)
+
+
+def _choices(kind: type[msgspec.Struct]) -> tuple[SchemaChoice, ...]:
+    """Acquisitions or models, where the table names one."""
+    if kind is SurrogateTable:
+        from planner.surrogate.frequency_models import MODELS
+
+        return tuple(SchemaChoice(name, model.sentence) for name, model in MODELS.items())
+    if kind is not AcquisitionTable:
+        return ()
+    from planner.design.propose import ACQUISITIONS, DESCRIPTIONS, DESIGNS
+
+    return tuple(SchemaChoice(name, DESCRIPTIONS[name]) for name in (*ACQUISITIONS, *DESIGNS))
+
+
+def _struct(given: types.Type) -> tuple[type[msgspec.Struct] | None, str]:
+    """The type of a table, of those in a list or by name, and how its head is written."""
+    for one in _alternatives(given):
+        if isinstance(one, types.StructType):
+            return one.cls, "[{}]"
+        inner: object = getattr(one, "item_type", getattr(one, "value_type", None))
+        if isinstance(inner, types.StructType):
+            return inner.cls, "[{}.NAME]" if isinstance(one, types.DictType) else "[[{}]]"
+    return None, ""
+
+
+def _alternatives(given: types.Type) -> tuple[types.Type, ...]:
+    return given.types if isinstance(given, types.UnionType) else (given,)
+
+
+_WORDS: dict[type, str] = {
+    types.StrType: "text", types.IntType: "whole number", types.FloatType: "number",
+    types.BoolType: "true or false",
+}  # fmt: skip
+
+
+def _takes(given: types.Type) -> str:
+    """What an entry takes, in words."""
+    known = [
+        t for t in _alternatives(given) if not isinstance(t, types.NoneType)
+        and type(t).__name__ != "UnsetType"
+    ]  # fmt: skip
+    return " or ".join(_word(t) for t in known)
+
+
+def _word(given: types.Type) -> str:
+    if isinstance(given, types.LiteralType):
+        return " or ".join(f'"{v}"' if isinstance(v, str) else str(v) for v in given.values)
+    if isinstance(given, types.TupleType):
+        return f"[{', '.join(_takes(t) for t in given.item_types)}]"
+    if isinstance(given, types.VarTupleType | types.ListType):
+        return f"list of {_takes(given.item_type)}"
+    if isinstance(given, types.DictType):
+        return "table"
+    return _WORDS.get(type(given), "value")
+
+
+def _default(field: types.Field) -> str:
+    if field.required:
+        return REQUIRED
+    value = field.default
+    if value is msgspec.NODEFAULT:
+        value = field.default_factory() if callable(field.default_factory) else None
+        if value is msgspec.UNSET:
+            return REQUIRED  # unless the same is stated in another unit
+    if value is None or value is msgspec.UNSET:
+        return "not used"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple | list | dict):
+        return "[" + ", ".join(str(v) for v in value) + "]" if value else "none"
+    return f'"{value}"' if isinstance(value, str) else f"{value:g}"
