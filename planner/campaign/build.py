@@ -68,10 +68,9 @@ def build(cell: Cell, state: CampaignState, hits_of: HitsOf, recall: Recall | No
         if straight is not None and straight.latest:
             hits = straight.latest
         fit = low.identified_robot
-        misfit = fit.identified.misfit if fit else 1.0
-        noise = FrfNoise.of(tuple(h.whole for h in hits), table.band_hz, misfit)
-        if fit is not None:
-            tuned, errors = _told_by(fit, cell, used, hits, q)
+        assert fit is not None
+        noise = FrfNoise.of(tuple(h.whole for h in hits), table.band_hz, fit.identified.misfit)
+        tuned, errors = _told_by(fit, cell, used, hits, q)
     low, (labelled, seen, primary) = _best_guided(cell, used, low, tuned)
     kernel = cell.config.surrogate.kernel
     surrogate = fit_surrogate(seen, primary, False, low.is_identified, kernel)
@@ -140,8 +139,8 @@ def _guided(
             for own, found in zip(tuned, (seen.frequency_hz, seen.frequency_sd_hz), strict=True)
         )
         seen = replace(seen, frequency_hz=hz, frequency_sd_hz=sd)
-    left, elsewhere = low.discrepancy if labelled else None, simulated_elsewhere(cell, low)
-    primary = fit_primary(seen, left, low.belief, table.model, table.kernel, elsewhere)
+    elsewhere = simulated_elsewhere(cell, low)
+    primary = fit_primary(seen, low.discrepancy, low.belief, table.model, table.kernel, elsewhere)
     return labelled, seen, primary
 
 

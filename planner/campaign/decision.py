@@ -90,12 +90,8 @@ def deciding_outputs(model: "Model", outputs: FrequencyOutputs) -> FrequencyOutp
 
 def _slope(pose: PoseDecision, expected_hz: np.ndarray) -> np.ndarray:
     """(k,) of each label: the margin's change per relative change of its frequency."""
-    found = np.zeros(len(expected_hz))
-    for k, hertz in enumerate(expected_hz):
-        off = np.abs(pose.frequency_hz / hertz - 1)
-        nearest = int(np.argmin(off))
-        if off[nearest] < NEAR:
-            found[k] = pose.slope[nearest]
+    off = np.abs(pose.frequency_hz / expected_hz[:, None] - 1)
+    found = np.where(off.min(axis=1) < NEAR, pose.slope[off.argmin(axis=1)], 0.0)
     # Where no label is known to matter, all do.
     return found if found.any() else np.ones_like(found)
 
@@ -106,10 +102,8 @@ def measurements_left(model: "Model") -> int | None:
     By the acquisition's own choice of them, if each margin's variance falls as that of the
     frequencies on which it hangs.
     """
-    decision = model.decision
-    probability = model.cell.config.stop.probability
-    if decision is None:
-        return None
+    decision, probability = model.decision, model.cell.config.stop.probability
+    assert decision is not None
     if decision.sure(probability):
         return 0
     outputs, poses = model.deciding

@@ -98,7 +98,7 @@ def local_size(h: np.ndarray, frequency_hz: np.ndarray) -> np.ndarray:
 
 
 def _log_likelihoods(model: "Model", edges_hz: np.ndarray) -> Iterator[np.ndarray]:
-    """(ZONES, SIZES) by each pose's FRFs, from fused modes of the others and the modes above."""
+    """(ZONES, SIZES) by each pose's FRFs, from fused modes of the others."""
     frfs, band = model.frfs, model.cell.config.modes.band_hz
     lines = int(np.clip(LINES // len(frfs), LEAST, MOST))
     with threadpool_limits(1):
@@ -107,8 +107,7 @@ def _log_likelihoods(model: "Model", edges_hz: np.ndarray) -> Iterator[np.ndarra
     for i, (hertz, s) in enumerate(zip(measured.frequency_hz, measured.s, strict=True)):
         one = fused[i : i + 1]
         mean, sd = frf_moments(_windowed(one, float(s.real[0])), hertz)
-        above = model.low.above(model.labelled[i].q[None], hertz)[0]
-        predicted = mean[0] * (s / (1j * s.imag)) ** 2 + above
+        predicted = mean[0] * (s / (1j * s.imag)) ** 2
         used = measured.used[i]
         left, known = measured.accelerance[i] - predicted, measured.sd[i] ** 2 + sd[0] ** 2
         square = local_size(predicted, hertz) ** 2

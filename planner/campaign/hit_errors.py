@@ -145,14 +145,11 @@ class CampaignHitErrors:
 
 
 def estimate(
-    visited: Sequence[Visited],
-    fit: IdentifiedRobot | None,
-    t: Tolerances,
-    band_hz: tuple[float, float],
+    visited: Sequence[Visited], fit: IdentifiedRobot, t: Tolerances, band_hz: tuple[float, float]
 ) -> CampaignHitErrors:
     """Misses of the hits of all poses, by the simulation as it was identified from them."""
     those = tuple(one for one in visited if len(one.columns.axis))
-    told = fit_hit_errors(fit.posterior, those) if fit is not None and those else None
+    told = fit_hit_errors(fit.posterior, those) if those else None
     return CampaignHitErrors(those, told, t, band_hz)
 
 

@@ -18,7 +18,6 @@ from planner.fit.identified_robot import PLACED, IdentifiedRobot
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior, exported
 from planner.fit.trials import as_found
-from planner.frf import synthesis
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
 from planner.surrogate.average import PRIOR_BELIEF
@@ -110,23 +109,6 @@ class LowFidelity:
             return self.simulate(q)
         return self.simulation.frequencies(q, self.count)
 
-    def above(self, q: np.ndarray, frequency_hz: np.ndarray) -> np.ndarray:
-        """What modes above those modelled add to the accelerance, (n, 3, 3, F) in m/s²/N.
-
-        0 unless the simulation was identified and fits: it is not known then.
-        """
-        if self.identified_robot is None or not self.is_identified:
-            return np.zeros((len(q), 3, 3, len(frequency_hz)), dtype=complex)
-        simulation = self.identified_robot.identified.simulation
-        modes = simulation.modes(q, self.count)
-        known = np.isfinite(modes.frequency_hz)
-        pole = synthesis.pole(
-            np.where(known, modes.frequency_hz, 1.0), np.where(known, modes.damping_ratio, 0.1)
-        )
-        residue = np.where(known[..., None, None], modes.residue, 0.0)
-        below = synthesis.accelerance(frequency_hz, pole, residue)
-        return simulation.accelerance(q, frequency_hz) - below
-
     @property
     def discrepancy(self) -> np.ndarray | None:
         """Size of ln f's error (count,) where the simulation was not fitted; None: not known."""
@@ -200,7 +182,7 @@ def identify_low_fidelity(
     recall: Recall = lambda used, find: find(),
     straighten: Straighten | None = None,
 ) -> LowFidelity:
-    """The simulation identified from the FRFs measured at q (n, dof) in rad.
+    """The simulation identified from the FRFs measured at n poses, at least one, q (n, dof) in rad.
 
     They may be between any points. Where the measurements in use are named, what is found of n
     begins where that of the first 1, 2, 3, 4, 6, 8, 12, … led: it is a function of the measurements
@@ -208,8 +190,7 @@ def identify_low_fidelity(
     that `straighten` gives by what was found before, if it is given; measurements are named then.
     """
     nominal = before.nominal
-    if nominal is None or not frfs:
-        return before
+    assert nominal is not None
     prior, others = before.prior, diagnosed(nominal)
 
     def search(count: int, known: FitRecord | None) -> Search:
@@ -242,9 +223,7 @@ def identify_low_fidelity(
 
 def _fewer(count: int) -> int:
     """The largest of 1, 2, 3, 4, 6, 8, 12, … below a count; 0 below 2."""
-    series = sorted(
-        {1, *(n for k in range(1, count.bit_length()) for n in (2**k, 3 * 2 ** (k - 1)))}
-    )
+    series = (n for k in range(count.bit_length()) for n in (2**k, 3 * 2**k // 2))
     return max((n for n in series if n < count), default=0)
 
 
@@ -252,9 +231,4 @@ def in_memory() -> Recall:
     """Recalls for as long as it is there itself."""
     kept: dict[Used, FitRecord] = {}
 
-    def recall(used: Used, find: Callable[[], FitRecord]) -> FitRecord:
-        if used not in kept:
-            kept[used] = find()
-        return kept[used]
-
-    return recall
+    return lambda used, find: kept[used] if used in kept else kept.setdefault(used, find())

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.campaign.cell import Cell
+from planner.campaign.frf_model import ErrorByZone, local_size
 from planner.campaign.hit_errors import CampaignHitErrors, HitErrorEstimate, systematic_errors
 from planner.campaign.labels import LabelledPose, observations
 from planner.campaign.low_fidelity import FEW_POSES, LowFidelity
@@ -28,10 +29,8 @@ from planner.words import counted, listed
 
 if TYPE_CHECKING:
     from planner.campaign.decision import Decision
-    from planner.campaign.frf_model import ErrorByZone
 
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
-ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
 
 
 @dataclass(frozen=True)
@@ -105,7 +104,7 @@ class Model:
     @cached_property
     def with_residues(self) -> Surrogate:
         """The surrogate of residues too, which FRFs alone need: fitted when asked for."""
-        return self.surrogate.with_residues(self.seen_exactly, self.low.is_identified)
+        return self.surrogate.with_residues(self.seen_exactly)
 
     @cached_property
     def workspace_prediction(self) -> ModalPrediction:
@@ -176,8 +175,7 @@ class Model:
 
         That is the decision about the cut where acquisition "stability" asks for it.
         """
-        stop = self.cell.config.stop
-        return len(self.labelled) >= stop.measurements_min and self._sure
+        return not self.waits_for
 
     @property
     def waits_for(self) -> str:
@@ -198,7 +196,7 @@ class Model:
             return self.decision is not None and self.decision.sure(stop.probability)
         return self.forecast.reached >= stop.probability
 
-    def repeat(self) -> "RepeatedPose | None":
+    def repeat(self) -> RepeatedPose | None:
         """The measured pose that gains most from more hits; None where a new pose gains more."""
         if not self.labelled:
             return None
@@ -238,15 +236,11 @@ class Model:
         mean, sd = self._modal_frf(q, frequency_hz)
         if not self.frfs:
             return mean, sd
-        from planner.campaign.frf_model import local_size
-
         return mean, np.hypot(sd, self.frf_error.at(frequency_hz) * local_size(mean, frequency_hz))
 
     @cached_property
-    def frf_error(self) -> "ErrorByZone":
+    def frf_error(self) -> ErrorByZone:
         """Of FRFs of the fused modes, beyond their sds. Worked out when asked for."""
-        from planner.campaign.frf_model import ErrorByZone
-
         return ErrorByZone.of(self)
 
     @property
@@ -266,12 +260,9 @@ class Model:
         return with_possible_laws(simulation)
 
     def _modal_frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """FRFs of the fused modes, and of those above them where a simulation knows them."""
+        """FRFs of the fused modes."""
         x, simulated = self.cell.features(q), self.low.simulate(q)
-        modes = self._predict(q, x, simulated, self.with_residues)
-        mean, sd = frf_moments(modes, frequency_hz)
-        above = self.low.above(q, frequency_hz)
-        return mean + above, np.hypot(sd, ABOVE_SD * np.abs(above))
+        return frf_moments(self._predict(q, x, simulated, self.with_residues), frequency_hz)
 
     @property
     def not_predicted(self) -> str:
@@ -359,7 +350,5 @@ class Model:
     @cached_property
     def frequency_sd_percent(self) -> np.ndarray:
         """Predicted sd of each natural frequency, root mean square over the workspace, in %."""
-        candidates, said = self.cell.candidates, self.simulated_candidates
-        f, sd = self.surrogate.frequencies(candidates.features, said.frequency_hz, visit=False)
-        sd = self._with_parameters(candidates.q, said, f, sd)
-        return 100 * np.sqrt(np.mean((sd / f) ** 2, axis=0))
+        found = self.workspace_prediction
+        return 100 * np.sqrt(np.mean((found.frequency_sd_hz / found.frequency_hz) ** 2, axis=0))

@@ -20,6 +20,7 @@ from planner.design.parameter_sensitivity import (
 from planner.design.propose import DESCRIPTIONS, INFORMED, Pick, Travel
 from planner.design.propose import propose as choose
 from planner.design.space_filling import DESIGNS
+from planner.dynamics.vibration import SimulatedModes
 from planner.errors import NoPoseLeftError
 from planner.fit.posterior import RobotBelief
 from planner.words import small
@@ -163,7 +164,7 @@ def uncertain_parameters(model: "Model") -> UncertainParameters | None:
     """The simulation's parameters as measured so far; None where it does not learn."""
     config, low = model.cell.config, model.low
     # One that was identified and then set aside has nothing to learn that would be believed.
-    if config.fidelity.simulation != "updated" or low.nominal is None or low.rejected is not None:
+    if config.fidelity.simulation != "updated" or low.rejected is not None:
         return None
     noise = model.frf_noise or FrfNoise.of((), config.modes.band_hz, 1.0)
     fit = low.identified_robot  # None: before it is measured
@@ -182,19 +183,15 @@ def acquisition_inputs(model: "Model", informed: bool) -> tuple[FrequencyOutputs
 
     `informed`: the poses are those of `informed_candidates`, with what they tell of parameters.
     """
-    cell, surrogate, open_ = model.cell, model.surrogate, uncertain_parameters(model)
+    cell, open_ = model.cell, uncertain_parameters(model)
     candidates, simulated = cell.candidates, model.simulated_candidates
     asked = informed_candidates(cell) if informed else np.arange(len(candidates.q))
-    x, inputs = candidates.features[asked], surrogate.frequency_inputs(simulated)[asked]
-    if open_ is None:
-        poses, covariance = Poses.plain(x, inputs), None
-    else:
-        poses = open_.poses(x, inputs, candidates.q[asked], simulated[asked], informed)
-        covariance = open_.covariance
+    there = candidates.features[asked], candidates.q[asked], simulated[asked]
+    poses, covariance = _poses(model, *there, informed), open_.covariance if open_ else None
     workspace = poses[: min(MOST_INFORMED, cell.spread)]
     weights = cell.config.acquisition.mode_weights
     target = Target.evenly(workspace, None if weights is None else np.array(weights))
-    return FrequencyOutputs.of(surrogate, target, _goal(model, target), covariance), poses
+    return FrequencyOutputs.of(model.surrogate, target, _goal(model, target), covariance), poses
 
 
 def _goal(model: "Model", workspace: Target) -> Target:
@@ -213,7 +210,13 @@ def _goal(model: "Model", workspace: Target) -> Target:
 
 def poses_at(model: "Model", q: np.ndarray) -> tuple[Poses, np.ndarray]:
     """Poses q (n, dof) in rad as targets, and their simulated frequencies (n, k) in Hz."""
-    said, x, open_ = model.low.simulate(q), model.cell.features(q), uncertain_parameters(model)
-    inputs = model.surrogate.frequency_inputs(said)
-    poses = open_.poses(x, inputs, q, said, False) if open_ else Poses.plain(x, inputs)
-    return poses, said.frequency_hz
+    said = model.low.simulate(q)
+    return _poses(model, model.cell.features(q), q, said), said.frequency_hz
+
+
+def _poses(
+    model: "Model", x: np.ndarray, q: np.ndarray, said: SimulatedModes, informed: bool = False
+) -> Poses:
+    """At features x (n, d), where the simulation says `said`."""
+    inputs, open_ = model.surrogate.frequency_inputs(said), uncertain_parameters(model)
+    return open_.poses(x, inputs, q, said, informed) if open_ else Poses.plain(x, inputs)

@@ -115,16 +115,18 @@ def _hit_errors(
     if nominal is None or not visited:
         return CampaignHitErrors((), None, Tolerances(), band)
     visits, whole = zip(*visited, strict=True)
-    fit, t = _learned(nominal, whole, np.array([one.q for one in visits]), band)
-    return estimate(visits, fit, t, band)
+    fit = _learned(nominal, whole, np.array([one.q for one in visits]), band)
+    return estimate(visits, fit, fit.posterior.tolerances, band)
 
 
 def _learned(
     nominal: Simulation, frfs: Sequence[Frf], q: np.ndarray, band: tuple[float, float]
-) -> tuple[IdentifiedRobot | None, Tolerances]:
+) -> IdentifiedRobot:
     """What FRFs at q (n, dof) in rad tell of a robot, within the tolerances that it states."""
     t = Tolerances.of(nominal.robot.config, nominal.robot.joints.slides)
-    return identify_low_fidelity(LowFidelity(1, nominal, t), frfs, q, band).identified_robot, t
+    fit = identify_low_fidelity(LowFidelity(1, nominal, t), frfs, q, band).identified_robot
+    assert fit is not None
+    return fit
 
 
 def _doubts(
@@ -147,10 +149,9 @@ def _doubts(
     if found and known:
         # What was identified from wrongly named points too is spoiled: from the tool's alone.
         at, frfs_of_tool = zip(*known, strict=True)
-        fit, _ = _learned(simulations[0], frfs_of_tool, q[list(at)], band)
-        if fit is not None:
-            tried = [*simulations, fit.identified.simulation]
-            found = misplaced(tried, q[index], frfs, usable, poses)
+        fit = _learned(simulations[0], frfs_of_tool, q[list(at)], band)
+        tried = [*simulations, fit.identified.simulation]
+        found = misplaced(tried, q[index], frfs, usable, poses)
     return found
 
 

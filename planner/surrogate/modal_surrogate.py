@@ -36,7 +36,6 @@ RESIDUE_PRIOR = OutputPrior(bias_sd=0.2, slope_sd=0.5, amplitude=0.2, nugget=0.0
 RESIDUE_PRIOR_ALONE = OutputPrior(bias_sd=0.7, slope_sd=0.0, amplitude=0.5, nugget=0.02)
 # Beside a simulation that was identified from these very recordings and fits them.
 DAMPING_PRIOR_IDENTIFIED = OutputPrior(bias_sd=0.1, slope_sd=0.1, amplitude=0.03, nugget=0.02)
-RESIDUE_PRIOR_IDENTIFIED = OutputPrior(bias_sd=0.03, slope_sd=0.1, amplitude=0.03, nugget=0.01)
 TYPICAL_RESIDUE = 1e-5  # m/(N·s), a robot's, where neither data nor simulation say anything
 RESIDUE_SAMPLES, RESIDUE_KEPT = 64, 8
 
@@ -87,7 +86,7 @@ class Surrogate:
         fused = self.primary.models[0]
         return np.where(fused.uses_low, self.primary.weights[0], 0.0)
 
-    def with_residues(self, seen: ModalObservations, identified: bool = False) -> "Surrogate":
+    def with_residues(self, seen: ModalObservations) -> "Surrogate":
         """The same with the residues fitted too, which may be exacter than those it has `seen`."""
         k, scale = self.count, _scale(seen)
         wide = np.repeat(scale, 18)
@@ -95,7 +94,7 @@ class Surrogate:
         low = residue_parts(seen.simulated.residue) / wide
         given = FusionData(
             TrainingData(seen.x, residue_parts(seen.residue) / wide, parts_sd / wide, low),
-            (RESIDUE_PRIOR_IDENTIFIED if identified else RESIDUE_PRIOR,) * (18 * k),
+            (RESIDUE_PRIOR,) * (18 * k),
             (RESIDUE_PRIOR_ALONE,) * (18 * k),
             np.zeros(18 * k),
         )
@@ -233,14 +232,14 @@ def fit_surrogate(
         primary: what `fit_primary` gave, where it was called already.
         residues: whether residues are fitted too, which takes two thirds of the time.
         identified: whether the simulation was identified from these measurements' own FRFs and fits
-            them, so that damping and residues are nearly its own.
+            them, so that damping is nearly its own.
         kernel: as of `fit_primary`; one that is named is the damping's, too.
     """
     if primary is None:
         primary = fit_primary(seen, kernel=kernel)
     damping = fit_damping(seen, identified, kernel)
     found = Surrogate(primary, damping, None, np.ones(seen.frequency_hz.shape[1]))
-    return found.with_residues(seen, identified) if residues else found
+    return found.with_residues(seen) if residues else found
 
 
 def _centre(low: np.ndarray, default: np.ndarray) -> np.ndarray:
