@@ -19,6 +19,7 @@ from planner.campaign.cell import Cell, refuse_errors
 from planner.campaign.config import CampaignConfig, check_config, load_campaign_config
 from planner.campaign.events import MeasuredMode, Proposal
 from planner.campaign.labels import (
+    NUMBERS,
     from_modal,
     from_mode,
     measured_records,
@@ -67,7 +68,7 @@ class AskTell:
             check_config(config, Path(TABLES))
         else:
             config = load_campaign_config(Path(tables))
-        self._cell = Cell.load(loaded.path, config, loaded)
+        self._cell = Cell.load(loaded, config)
         refuse_errors(self._cell.examined)
         self._recall = in_memory()
         self._state = CampaignState()
@@ -186,11 +187,11 @@ def _mode(given: Mode | Mapping[str, float] | Sequence[float]) -> MeasuredMode:
     """A mode as it was told; what was not said is unknown (NaN, null)."""
     if isinstance(given, Mode):
         return from_mode(given)
-    names = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd"
-    values = given if isinstance(given, Mapping) else dict(zip(names, given, strict=False))
-    unknown = set(values) - set(names)
+    values = given if isinstance(given, Mapping) else dict(zip(NUMBERS, given, strict=False))
+    unknown = set(values) - set(NUMBERS)
     if unknown or "frequency_hz" not in values:
-        raise InputError(f"A mode has {', '.join(names)}; {sorted(unknown) or 'the first'} is not.")
+        said = sorted(unknown) or "the first"
+        raise InputError(f"A mode has {', '.join(NUMBERS)}; {said} is not.")
     f = float(values["frequency_hz"])
     zeta = float(values.get("damping_ratio", np.nan))
     sd = float(values.get("frequency_sd_hz", FREQUENCY_SD * f))

@@ -44,20 +44,15 @@ class Cell:
     workspace: Workspace
 
     @classmethod
-    def load(
-        cls,
-        robot_toml: Path,
-        config: CampaignConfig,
-        robot: Robot | None = None,
-    ) -> "Cell":
-        """Load the robot and hold the workspace against it; InputError where they disagree.
+    def load(cls, robot: Path | Robot, config: CampaignConfig) -> "Cell":
+        """Of a robot, or its robot.toml, with the workspace held against it.
 
-        `robot` is the one of robot_toml, where it was loaded already.
+        Raises InputError where they disagree.
         """
         check_name(config.acquisition.name, "campaign.toml, [acquisition] name")
         chosen, simulated = config.surrogate, config.fidelity.simulation != "none"
         check_choice(chosen.model, chosen.kernel, simulated, "campaign.toml, [surrogate]")
-        robot = robot or Robot.load(robot_toml)
+        robot = robot if isinstance(robot, Robot) else Robot.load(robot)
         if given := config.of_the_cell():  # of hits, sensor, readback and diagnosis
             robot = replace(robot, config=msgspec.structs.replace(robot.config, **given))
         simulation = Simulation(robot) if simulated else None

@@ -14,7 +14,7 @@ from planner.errors import InputError
 from planner.milling.cut import Cut, cuts_at, no_pose, turned_to
 from planner.milling.cutter_frf import CutterFrf, names_in, of_accelerance, read_frf
 from planner.milling.cutter_modes import load_mode_file
-from planner.milling.structure import SAMPLES, OutOfBandError, Structure, of_frf, of_modes
+from planner.milling.structure import OutOfBandError, Structure, of_frf, of_modes
 from planner.recording.folder import several_poses
 
 if TYPE_CHECKING:
@@ -35,19 +35,19 @@ class StabilityRequest:
 
     source: Path
     cut: Path
-    pose: str | None = None
-    point: str | None = None
-    samples: int = SAMPLES
-    tool: Path | None = None
-    reference: Path | None = None
-    robot: Path | None = None
-    noise: float = 0.0
-    from_names: bool = False  # FRFs' places from the names of their files
-    peak_force_n: float | None = None
-    path: Path | None = None
-    origin: str | None = None
-    poses: int = 12
-    turns: bool = False
+    pose: str | None
+    point: str | None
+    samples: int
+    tool: Path | None
+    reference: Path | None
+    robot: Path | None
+    noise: float
+    from_names: bool  # FRFs' places from the names of their files
+    peak_force_n: float | None
+    path: Path | None
+    origin: str | None
+    poses: int
+    turns: bool
 
     @property
     def wanted(self) -> tuple[float, float] | None:

@@ -109,13 +109,20 @@ def guess(urdf: Path, weights: StatedMasses, robot_toml: Path, planned: bool = T
         name, str(urdf), chain.tcp, chain.sensor, held=chain.held, geometric_stiffness=True
     )
     robot = Robot.of(config, robot_toml)
+    stated_kg = total_stated(robot)
     if weights.robot is None and nothing_stated(robot):
         raise InputError(
             f"{urdf} states no masses; give the robot's, from its data sheet, with --mass-kg."
         )
-    stated_kg = _links_kg(robot, weights.robot)
+    # Far less are placeholders, or not all of its links: common. No links weigh far more.
+    if weights.robot is not None and stated_kg > (1 + SAME) * weights.robot:
+        raise InputError(
+            f"--mass-kg is {weights.robot:g}, and the links of {robot.urdf_path} weigh "
+            f"{stated_kg:.4g} kg together; give the robot's mass in kg, or leave it out to use the "
+            f"URDF's masses."
+        )
     links = default_inertias(robot, weights.robot)
-    payload = weights.payload or PAYLOAD_SHARE * (weights.robot or total_stated(robot))
+    payload = weights.payload or PAYLOAD_SHARE * (weights.robot or stated_kg)
     carried = (_tool(chain.tcp, weights.tool, robot),) if weights.tool else ()
     floor = _floor(robot)
     config = msgspec.structs.replace(config, link=links, payload=carried, obstacle=(floor,))
@@ -201,21 +208,6 @@ def _guesses(
     yield Guess("height of the floor", round(floor.center_m[2] + floor.size_m[2] / 2, 4), None, "m")
     if ranges is not None:
         yield Guess("workspace joints_deg", ranges, None)
-
-
-def _links_kg(robot: Robot, mass_kg: float | None) -> float:
-    """What the URDF's links weigh in kg; InputError where `mass_kg` cannot be of that robot.
-
-    Links that weigh far less than the robot are placeholders, or not all of its links: common. None
-    weigh far more.
-    """
-    stated = total_stated(robot)
-    if mass_kg is not None and stated > (1 + SAME) * mass_kg:
-        raise InputError(
-            f"--mass-kg is {mass_kg:g}, and the links of {robot.urdf_path} weigh {stated:.4g} kg "
-            f"together; give the robot's mass in kg, or leave it out to use the URDF's masses."
-        )
-    return stated
 
 
 def _mass_conflict(robot: Robot, mass_kg: float | None, stated_kg: float) -> Iterator[str]:

@@ -27,16 +27,10 @@ from planner.words import command
 
 T = TypeVar("T")
 
-_ENTRY = msgspec.json.Decoder(Entry)
-_ENCODER = msgspec.json.Encoder()
-
 
 class _Line(msgspec.Struct):
     check: str
     entry: msgspec.Raw
-
-
-_LINE = msgspec.json.Decoder(_Line)
 
 
 @dataclass(frozen=True)
@@ -47,7 +41,6 @@ class LogContent:
     check: str
     whole_bytes: int
     torn: bytes
-    newline_missing: bool = False
 
 
 def _chain(check: str, entry: bytes) -> str:
@@ -56,7 +49,7 @@ def _chain(check: str, entry: bytes) -> str:
 
 def encode_line(previous_check: str, entry: Entry) -> tuple[bytes, str]:
     """One line of the log and its check."""
-    body = _ENCODER.encode(entry)
+    body = msgspec.json.encode(entry)
     check = _chain(previous_check, body)
     return b'{"check":"%s","entry":%s}\n' % (check.encode(), body), check
 
@@ -87,9 +80,7 @@ def parse(data: bytes, name: str = "log.jsonl") -> LogContent:
             break
         entries.append(entry)
         check, position = new_check, stop
-    torn = data[position:]
-    missing = bool(data) and not torn and not data.endswith(b"\n")
-    return LogContent(tuple(entries), check, position, torn, missing)
+    return LogContent(tuple(entries), check, position, data[position:])
 
 
 def _read_line(line: bytes, check: str, seq: int, name: str) -> tuple[Entry | None, str]:
@@ -98,7 +89,7 @@ def _read_line(line: bytes, check: str, seq: int, name: str) -> tuple[Entry | No
     Raises JournalError where the line is whole, as its check says, and this program cannot read it.
     """
     try:
-        parsed = _LINE.decode(line)
+        parsed = msgspec.json.decode(line, type=_Line)
     except (msgspec.DecodeError, UnicodeDecodeError):
         return None, check
     body = bytes(parsed.entry)
@@ -106,7 +97,7 @@ def _read_line(line: bytes, check: str, seq: int, name: str) -> tuple[Entry | No
     if parsed.check != new_check:
         return None, check
     try:
-        entry = _ENTRY.decode(body)
+        entry = msgspec.json.decode(body, type=Entry)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise JournalError(
             f"{name}, line {seq}, is whole, but planner {__version__} does not know what it says "
@@ -190,17 +181,15 @@ class Journal:
     def _repair_tail(self) -> None:
         content = self._content
         remove_parts(self.path.parent)
-        if not (content.torn or content.newline_missing):
-            return
         if content.torn:
             aside = self.path.with_name(f"{self.path.name}.torn-{content.whole_bytes}")
             write_synced(aside, content.torn)
             with open(self.path, "r+b") as file:
                 file.truncate(content.whole_bytes)
                 os.fsync(file.fileno())
-        else:
+            self._content = self._load()
+        elif content.entries and not file_content.read(self.path).endswith(b"\n"):
             _append_synced(self.path, b"\n")
-        self._content = self._load()
 
     def append(self, event: AnyEvent) -> Entry:
         """Write one event and return only once it is on the disk."""

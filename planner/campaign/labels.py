@@ -27,21 +27,10 @@ NUMBERS = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd"  # of
 
 def to_mode(measured: MeasuredMode) -> Mode:
     """A mode as the numerics want it, from how the log keeps it."""
-    cells = np.array(
-        [[np.nan if v is None else v for v in cell] for cell in measured.residue], dtype=float
-    )
-    residue = (cells[:, 0] + 1j * cells[:, 1]).reshape(3, 3)
+    real, imaginary, sd = np.array(measured.residue, dtype=float).T.reshape(3, 3, 3)  # None: NaN
+    numbers = {name: getattr(measured, name) for name in (*NUMBERS, "probability")}
     shape = np.array([complex(re, im) for re, im in measured.shape])
-    return Mode(
-        measured.frequency_hz,
-        measured.frequency_sd_hz,
-        measured.damping_ratio,
-        measured.damping_sd,
-        residue,
-        cells[:, 2].reshape(3, 3),
-        shape,
-        measured.probability,
-    )
+    return Mode(**numbers, residue=real + 1j * imaginary, residue_sd=sd, shape=shape)
 
 
 def from_mode(mode: Mode) -> MeasuredMode:
@@ -52,13 +41,9 @@ def from_mode(mode: Mode) -> MeasuredMode:
 
     cells = zip(mode.residue.ravel(), mode.residue_sd.ravel(), strict=True)
     return MeasuredMode(
-        frequency_hz=float(mode.frequency_hz),
-        frequency_sd_hz=float(mode.frequency_sd_hz),
-        damping_ratio=float(mode.damping_ratio),
-        damping_sd=float(mode.damping_sd),
+        **{name: float(getattr(mode, name)) for name in (*NUMBERS, "probability")},
         shape=tuple((float(s.real), float(s.imag)) for s in mode.shape),
         residue=tuple((number(r.real), number(r.imag), number(sd)) for r, sd in cells),
-        probability=float(mode.probability),
     )
 
 
@@ -148,8 +133,7 @@ def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObserva
     simulated = SimulatedModes(empty, empty, np.zeros((0, count, 3, 3), complex))
     if n:
         simulated = SimulatedModes.joined([p.simulated for p in labelled])
-    x = cell.features(q) if n else np.zeros((0, len(cell.workspace.feature_names)))
-    return gathered(x, [p.modes if p.own else () for p in labelled], simulated)
+    return gathered(cell.features(q), [p.modes if p.own else () for p in labelled], simulated)
 
 
 @dataclass(frozen=True, eq=False)

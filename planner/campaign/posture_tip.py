@@ -84,14 +84,13 @@ def _hit(folder: Path, pose: str | None) -> tuple[np.ndarray, np.ndarray, dict[s
     if np.any(np.abs(there - low)[~moves] > 0):
         raise InputError(f"{pose} turns a joint that no pose of {folder / TABLE} turns; hit some.")
     x, at = ((each - low)[..., moves] / span[moves] for each in (q, there))
-    return x, at, {name: _matrix(name, tuple(own)) for name, own in sources.items()}
-
-
-def _matrix(pose: str, sources: tuple[Source, ...]) -> FrfMatrix:
-    given = frf_set(sources, None)
-    if given is None:
-        raise InputError(f"Pose {pose} has no FRFs between points; export those between two.")
-    return given.matrix(None)
+    matrices = {}
+    for name, own in sources.items():
+        given = frf_set(tuple(own), None)
+        if given is None:
+            raise InputError(f"Pose {name} has no FRFs between points; export those between two.")
+        matrices[name] = given.matrix(None)
+    return x, at, matrices
 
 
 def _followed(matrices: list[FrfMatrix], dofs: list[Dof], x: np.ndarray) -> list[Parameters]:

@@ -188,12 +188,8 @@ def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState
         case events.Configured():
             return replace(changed, configured=event)
         case events.Proposed():
-            return replace(
-                state,
-                open=tuple(p.pose for p in event.proposals),
-                proposed_by=event.acquisition,
-                stale=False,
-            )
+            open_ = tuple(p.pose for p in event.proposals)
+            return replace(state, open=open_, proposed_by=event.acquisition, stale=False)
         case events.Imported():
             return _imported(state, changed, event, entry)
         case events.Confirmed():
@@ -238,16 +234,12 @@ def _imported(
         for pose, m in state.measurements.items()
     }
     before = without(earlier.get(event.pose), event.replaced)
+    hits = (*(before.hits if before else ()), *event.hits)
+    when, asked = (before.time, before.question) if before else (entry.time, None)
     measurement = Measurement(
-        pose=event.pose,
-        joints_deg=event.joints_deg,
-        hits=(*(before.hits if before else ()), *event.hits),
-        modes=event.modes,
-        remarks=event.remarks,
-        amplitude=event.amplitude,
-        time=before.time if before else entry.time,
-        question=event.question or (before.question if before else None),
-    )
+        event.pose, event.joints_deg, hits, event.modes, event.remarks, event.amplitude,
+        time=when, question=event.question or asked,
+    )  # fmt: skip
     left = state.open
     if measurement.modes:
         left = tuple(pose for pose in state.open if pose != event.pose)

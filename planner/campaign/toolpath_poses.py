@@ -20,7 +20,6 @@ from planner.robot.robot import Robot
 
 TURN_DEG = 30.0  # between angles about the tool's axis that are tried
 TURNS_DEG = np.arange(0.0, 360.0, TURN_DEG)
-MOST_POSES = 200
 STARTS = 4  # from which the first pose of a program is looked for, for each turn
 
 
@@ -118,8 +117,6 @@ def _program(
     robot: Robot, asked: StabilityRequest, path: Toolpath, cut: Cut
 ) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
     """Names, angles (p, dof) and feeds (p, 3): the first turn at which all can be reached."""
-    if not 2 <= asked.poses <= MOST_POSES:
-        raise InputError(f"--poses {asked.poses}: give 2 to {MOST_POSES}.")
     position, feeds, names = path.points(asked.poses)
     position = position + _origin_m(asked)
     collisions, reasons = Collisions(robot), []

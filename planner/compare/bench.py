@@ -72,7 +72,7 @@ class Bench:
 @lru_cache(maxsize=2)
 def cell_of(bench: Bench) -> PoolCell:
     """The bench's cell, made once in each process; it is not safe to share among threads."""
-    loaded = Cell.load(bench.robot.path, bench.config, bench.robot)
+    loaded = Cell.load(bench.robot, bench.config)
     return PoolCell(loaded.config, loaded.robot, loaded.simulation, loaded.workspace, bench.q)
 
 
@@ -114,7 +114,7 @@ def assemble(
     that all strategies and all ways to use the simulation are judged by the same frequencies.
     """
     nominal = msgspec.structs.replace(config, fidelity=FidelityTable("frozen"))
-    cell = Cell.load(robot.path, nominal, robot)
+    cell = Cell.load(robot, nominal)
     usable, remarks = _usable(robot, cell.workspace, poses)
     measured = tuple(pose.measurement for pose in usable)
     seen = observations(cell, label(cell, measured))
