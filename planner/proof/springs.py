@@ -95,9 +95,10 @@ def compensation(spring: Compensator, angle_rad: float) -> float:
 
 
 def _stated(block: dict) -> Spring:
-    """Of a [[compliance]]: a shift where it says so, or is stated in N/m."""
-    slide = bool(block.get("slide", False)) or "stiffness_n_m" in block
-    k, c = (block[f"{n}_{u}" if f"{n}_{u}" in block else n] for n, u in STATED)
+    """Of a [[compliance]]: a shift where it says so, is stated in N/m, or has a lever."""
+    slide = bool(block.get("slide", False)) or "stiffness_n_m" in block or "lever_m" in block
+    lever = block.get("lever_m", 1.0)
+    k, c = (block[f"{n}_{u}" if f"{n}_{u}" in block else n] / lever**2 for n, u in STATED)
     return Spring(block["joint"], tuple(block["axis"]), k, c, slide)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from planner.robot.joint_laws import LawTable
 
 BASE = "base"  # as the joint of a [[compliance]]: between floor and robot
+LONGEST_LEVER_M = 100.0
 LOSS_FACTOR_BELOW = 2.0  # of a spring: more is a damper
 SLIDE_SD_MM = 0.5  # as far as 0.05° take a tool at half a metre
 STATED_OF_SLIDE = {"stiffness": "stiffness_n_m", "damping": "damping_n_s_m"}
@@ -73,6 +74,11 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise ValueError(f"Object missing required field `{missing}`")
         if self.height_m and (self.joint != BASE or self.slide):
             raise ValueError(f'height_m is of a rotation of joint = "{BASE}" only')
+        if not 0 <= self.lever_m < LONGEST_LEVER_M or (self.lever_m and self.slide):
+            raise ValueError(
+                f"lever_m is {self.lever_m:g}; it is in m, from 0 to {LONGEST_LEVER_M:g}, of "
+                "blocks without slide and with stiffness in N·m/rad"
+            )
 
 
 class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -28,6 +28,10 @@ BEND = (
     '[[effects.compliance]]\njoint = "link_2"\naxis = [0, 0, 1]\nstiffness = 4.0e6\n'
     "damping = 2.0e3\n"
 )
+BEAM = (
+    '[[effects.compliance]]\njoint = "link_2"\naxis = [0, 1, 0]\nlever_m = 0.3\nstiffness = 4.0e6\n'
+    "damping = 2.0e3\n"
+)
 EFFECT = '[[effects]]\neffect = "x"\nat = ""\n'
 LUMP = (AttachedMass("link_4", (0.1, 0.05, -0.2), 30.0),)
 POINT = (AttachedResonator("link_3", (0.1, 0, 0.2), (0, 0.6, 0.8), 14.0, 17.0, 0.03),)
@@ -45,6 +49,11 @@ SAME = {
         {"extra": tuple(Spring("base", axis, 2e6, 600.0) for axis in AXES)}, 1e-6,
     ),
     "a bending link": (EFFECT + BEND, {"extra": (Spring("link_2", (0, 0, 1.0), 4e6, 2e3),)}, 0.02),
+    "a beam": (
+        EFFECT + BEND + BEAM,
+        {"extra": (Spring("link_2", (0, 0, 1.0), 4e6, 2e3),
+                   Spring("link_2", (0, 1.0, 0), 4e6 / 0.09, 2e3 / 0.09, True))}, 0.02,
+    ),
 }  # fmt: skip
 
 
@@ -178,16 +187,18 @@ def test_shifts_of_the_base_add_to_its_turning(tmp_path):
     )
 
 
-WRONG_HEIGHTS = {
+WRONG_PLACES = {
     "no shift": ({"along_y": ""}, r"number 2 \(base\) has height_m = -0\.7.*stiffness_n_m"),
     "of a joint": ({"turn": BLOCKS["turn"] + "\nheight_m = 0.1"}, 'rotation of joint = "base"'),
     "of a shift": ({"along_x": BLOCKS["along x"] + "\nheight_m = 0.1"}, "of a rotation"),
+    "a lever of a shift": ({"along_x": BLOCKS["along x"] + "\nlever_m = 0.1"}, "without slide"),
+    "a lever backwards": ({"turn": BLOCKS["turn"] + "\nlever_m = -0.1"}, "lever_m is -0.1"),
 }
 
 
-@pytest.mark.parametrize("case", WRONG_HEIGHTS)
-def test_a_height_that_nothing_goes_with_is_refused(case, tmp_path):
-    replaced, words = WRONG_HEIGHTS[case]
+@pytest.mark.parametrize("case", WRONG_PLACES)
+def test_a_height_or_lever_that_nothing_goes_with_is_refused(case, tmp_path):
+    replaced, words = WRONG_PLACES[case]
     with pytest.raises(InputError, match=words):
         Simulation(column(tmp_path, **replaced))
 
