@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from planner.effects.effect import Operator
 from planner.fit.fitted import StructureFit
@@ -69,6 +68,8 @@ def matched(
 ) -> list[tuple[Operator, Operator]]:
     """What was added to a fit, each with that of another's `effects` which is called the same and
     fewest sds away: a link may carry several hoses."""
+    from scipy.optimize import linear_sum_assignment  # not needed between hits
+
     mine, theirs = added(fit), dict(zip(other.structure.effects, other.structure.own, strict=True))
     own = dict(zip(fit.structure.effects, fit.structure.own, strict=True))
     apart = np.full((len(mine), len(effects)), UNLIKE)

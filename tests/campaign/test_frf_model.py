@@ -12,7 +12,7 @@ from planner.dataset.store import Store
 from planner.frf.metrics import agreement, direct_mean
 from planner.surrogate.leave_one_out import left_out_modes
 from planner.surrogate.modal_surrogate import fit_surrogate
-from tests.support.case_campaigns import CaseCampaign, Score, lacking
+from tests.support.case_campaigns import CaseCampaign, FrfScore, lacking
 from tests.support.shipped_campaign import RECORDINGS, shipped_campaign
 from tests.support.surrogates import observed
 
@@ -44,7 +44,7 @@ def base(tmp_path_factory):
 
 
 def test_frfs_of_a_soft_base_get_better_with_the_second_pose(base: CaseCampaign):
-    first, second = (Score.of(base.case, base.after(n)) for n in (1, 2))
+    first, second = (FrfScore.of(base.case, base.after(n)) for n in (1, 2))
     print(first, second)
     assert second.frac > 0.995
     assert second.frac > first.frac - 0.002

@@ -1,5 +1,6 @@
 """Two effects that stand for one do not hide from each other how much it matters."""
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -29,9 +30,21 @@ def fewer(explored, f: SimpleNamespace, effect: SimpleNamespace) -> SimpleNamesp
     return fit(*(SimpleNamespace(**vars(o)) for o in f.effects if o is not effect))
 
 
+def matched(f: SimpleNamespace, other: object, effects: Sequence[SimpleNamespace]) -> list:
+    """By the labels, which here stay."""
+    return [(mine, own) for mine in f.effects for own in effects if mine.label == own.label]
+
+
+def gone(fewer: SimpleNamespace, f: SimpleNamespace) -> list:
+    left = {effect.label for effect in fewer.effects}
+    return [effect for effect in f.effects if effect.label not in left]
+
+
 @pytest.fixture(autouse=True)
 def plain_fits(monkeypatch):
     monkeypatch.setattr(verdict, "added", lambda f: f.effects)
+    monkeypatch.setattr(verdict, "matched", matched)
+    monkeypatch.setattr(verdict, "gone", gone)
     monkeypatch.setattr(verdict, "built", lambda f: ())
     monkeypatch.setattr(verdict, "_beyond", lambda f: [])
     monkeypatch.setattr(verdict, "_band", lambda f: (5.0, 50.0))
