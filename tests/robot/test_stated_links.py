@@ -258,8 +258,8 @@ def test_a_body_of_less_than_no_inertia_is_refused_in_a_sentence(tmp_path, times
 LENGTH, WIDTH, HEIGHT, MASS = 1.2, 0.5, 0.3, 90.0
 
 
-def halves(tmp_path, urdf=lambda text: text):
-    """Inner and outer half (10,) each of link_2, and where it is cut (3,)."""
+def bent(tmp_path, urdf=lambda text: text) -> Robot:
+    """A robot whose link_2 bends."""
     path = ARMS["kr210"].write(tmp_path)
     robot = Robot.load(path)
     robot.urdf_path.write_text(urdf(robot.urdf_path.read_text()))
@@ -267,7 +267,12 @@ def halves(tmp_path, urdf=lambda text: text):
         path.read_text() + '\n[[effects]]\neffect = "x"\nat = ""\n[[effects.compliance]]\n'
         'joint = "link_2"\naxis = [0, 0, 1]\nstiffness = 4.0e6\ndamping = 2.0e3\n'
     )
-    robot = Robot.load(path)
+    return Robot.load(path)
+
+
+def halves(tmp_path, urdf=lambda text: text):
+    """Inner and outer half (10,) each of link_2, and where it is cut (3,)."""
+    robot = bent(tmp_path, urdf)
     model = virtual_model(robot)
     by_name = dict(zip(model.bodies, model.inertia, strict=True))
     cut = robot.model.jointPlacements[3].translation / 2
@@ -312,6 +317,20 @@ def test_halves_together_are_the_link_whichever_way_it_leans(tmp_path):
     moved += outer[0] * (cut @ cut * np.eye(3) - np.outer(cut, cut))
     order = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]
     np.testing.assert_allclose(both + [moved[ij] for ij in order], whole[4:], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.0, False), (0.2, True)])
+def test_halves_that_a_urdf_has_no_place_for_are_told(share, told, tmp_path):
+    """What one half has gained the other has lost, so that the link weighs the same."""
+    robot = bent(tmp_path)
+    simulation = Simulation(robot)
+    bodies, change = simulation.elastic.bodies, np.zeros_like(simulation.elastic.inertia)
+    outer = bodies.index("link_2, outer half")
+    change[outer] = -share * simulation.elastic.inertia[outer]
+    change[bodies.index("joint_2")] = share * simulation.elastic.inertia[bodies.index("joint_2")]
+    changed = _identified(simulation.changed(simulation.elasticity, change))
+    written = write_robot(tmp_path / "out" / "robot.toml", robot, changed)
+    assert any("halves of a link that bends" in text for text in written.remarks) == told
 
 
 def test_a_body_whose_halves_would_have_no_moments_is_refused():
