@@ -1,28 +1,26 @@
 """An identified robot as a folder: robot.toml, whose comments and order stay, and its URDF."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import msgspec
 import numpy as np
 import tomlkit
 
-from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.fit.result import Identification
-from planner.robot.config import Compliance, Payload, entry_of
+from planner.robot.config import Compliance, OuterHalf, Payload, entry_of
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.joint_laws import LawTable
 from planner.robot.mesh_files import copy_meshes
 from planner.robot.robot import Robot
-from planner.robot.urdf_inertias import with_inertias
-from planner.robot.virtual_joints import OUTER
-from planner.words import listed, significant
+from planner.robot.urdf_inertias import outer_halves, with_inertias
+from planner.words import listed
 
 INERTIAL_ENTRIES = "mass_kg", "centre_m", "inertia_kg_m2"  # of [[link]]
 FOUND = "resonator", "harmonic"  # blocks that an identification may add
-LINES = 200  # of the band, on which a written robot is compared
 DIGITS = 6  # significant ones: more than any identification knows
 
 
@@ -33,11 +31,12 @@ def updated_toml(
     added: Sequence[Compliance] = (),
     laws: Sequence[LawTable] = (),
     payload: Sequence[Payload] = (),
+    halves: Mapping[str, OuterHalf] = MappingProxyType({}),
 ) -> str:
     """The robot.toml `text` with the [[compliance]] blocks' numbers (and its urdf) replaced.
 
     A new `urdf` is one of `with_inertias`, which has what [[link]] states in it; so are `payload`s
-    in the stead of those in the text.
+    in the stead of those in the text, and outer `halves` by the links that bend.
     `added` blocks, which the identification counts last, follow those in the text, and so do
     resonators and harmonics that it found; those in the text take its numbers. `laws` replace
     those stated for their joints, and bring the pulse of the hits that told them.
@@ -73,6 +72,7 @@ def updated_toml(
     if urdf is not None:
         document["urdf"] = urdf
         drop_stated_inertias(document)
+    _state_halves(document, halves)
     return tomlkit.dumps(document)
 
 
@@ -93,6 +93,18 @@ def _state_laws(document: tomlkit.TOMLDocument, laws: Sequence[LawTable], pulse_
         table.add(tomlkit.nl())
         document["law"].append(table)
     document.setdefault("hammer", tomlkit.table())["pulse_ms"] = float(f"{pulse_ms:.3g}")
+
+
+def _state_halves(document: tomlkit.TOMLDocument, halves: Mapping[str, OuterHalf]) -> None:
+    links = {block["link"]: block for block in document.get("link", ())}
+    for link, half in halves.items():
+        if link not in links:
+            links[link] = tomlkit.table()
+            links[link]["link"] = link
+            document.setdefault("link", tomlkit.aot()).append(links[link])
+        inline = tomlkit.inline_table()
+        inline.update(msgspec.to_builtins(half))
+        links[link]["outer_half"] = inline
 
 
 def drop_stated_inertias(document: tomlkit.TOMLDocument) -> None:
@@ -148,29 +160,14 @@ def write_robot(
         inside = sum(len(e.compliance) for e in robot.config.effects)
         added = robot.config.compliance[len(tomlkit.parse(stated)["compliance"]) + inside :]
         payload = robot.config.payload if moved is None else moved.payload
-        _write_new(out, updated_toml(stated, result, name, added, laws, payload))
+        unchanged = () if moved is None else moved.unchanged
+        halves = outer_halves(robot, result.simulation.elastic, unchanged)
+        _write_new(out, updated_toml(stated, result, name, added, laws, payload, halves))
     except OSError as error:
         raise InputError(
             f"{out} cannot be written ({error.strerror}); name another file with --out."
         ) from None
-    remarks = _impossible(() if moved is None else moved.unchanged)
-    if not laws and any(body.endswith(OUTER) for body in bodies):
-        remarks += _halves_lost(Robot.load(out), result.simulation)
-    return Written(out, urdf, remarks)
-
-
-def _halves_lost(written: Robot, found: Simulation) -> tuple[str, ...]:
-    """How far off FRFs are, as a URDF has one inertia for both halves of a link that bends."""
-    lines_hz, q = np.linspace(*written.config.band_hz, LINES), written.middle_rad
-    h, other = (s.accelerance(q, lines_hz) for s in (found, Simulation(written)))
-    off = float(np.linalg.norm(other - h) / np.linalg.norm(h))
-    if off < written.config.diagnose.matters:
-        return ()
-    return (
-        f"FRFs of the written robot are {significant(100 * off)} % off those of what was found, "
-        f"with all joints in the middle: halves of a link that bends were identified apart, and a "
-        f"URDF has one inertia for both. Predictions by --predict are of what was found.",
-    )
+    return Written(out, urdf, _impossible(unchanged))
 
 
 def _impossible(unchanged: Sequence[str]) -> tuple[str, ...]:

@@ -94,13 +94,26 @@ class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     inertia_kg_m2: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+class OuterHalf(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the outer half of a link that bends weighs, payloads on it included; the rest is inner.
+
+    Mass in kg, centre of mass in the link's frame, moments (xx, xy, xz, yy, yz, zz) in kg·m² about
+    that centre along the link's axes.
+    """
+
+    mass_kg: float
+    centre_m: tuple[float, float, float]
+    inertia_kg_m2: tuple[float, float, float, float, float, float]
+
+
 class LinkTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What a link weighs, in the stead of the URDF's <inertial>, and how sure that is.
 
     Mass in kg, centre of mass in the link's frame, moments (xx, xy, xz, yy, yz, zz) in kg·m² about
     that centre along the link's axes: all three or, where only the sd is to be stated, none.
     `sd_percent` is that of mass and moments, the centre's in percent of the radius of gyration;
-    `guessed` numbers are marked wherever masses are shown.
+    `guessed` numbers are marked wherever masses are shown. A link that bends is cut into the halves
+    of a uniform beam unless `outer_half` states the outer one.
     """
 
     link: str
@@ -109,6 +122,7 @@ class LinkTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     inertia_kg_m2: tuple[float, float, float, float, float, float] | None = None
     sd_percent: float | None = None
     guessed: bool = False
+    outer_half: OuterHalf | None = None
 
 
 class Resonator(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

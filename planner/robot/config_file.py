@@ -19,6 +19,7 @@ from planner.robot.config import (
     ControllerTable,
     DiagnoseTable,
     HitsTable,
+    OuterHalf,
     ReadbackTable,
     RobotConfig,
     SensorTable,
@@ -195,18 +196,24 @@ def _check_links(config: RobotConfig, path: Path) -> None:
         if named.index(table.link) != number - 1:
             raise InputError(f"{entry} states a link that an earlier one states; keep one of them.")
         _within(f"{entry}: sd_percent", table.sd_percent, most=LARGEST_SD_PERCENT)
+        if table.outer_half is not None:
+            _check_body(f"{entry} outer_half", table.outer_half)
         stated = (table.mass_kg, table.centre_m, table.inertia_kg_m2)
         if all(value is None for value in stated):
-            if table.sd_percent is None:
+            if table.sd_percent is None and table.outer_half is None:
                 raise InputError(f"{entry} states nothing; give mass_kg, centre_m, inertia_kg_m2.")
             continue
         if table.mass_kg is None or table.centre_m is None or table.inertia_kg_m2 is None:
             raise InputError(f"{entry} needs mass_kg, centre_m and inertia_kg_m2; give all three.")
-        _within(f"{entry}: mass_kg", table.mass_kg, " kg")
-        _finite(f"{entry}: centre_m", table.centre_m, 1e2, "3 lengths in m")
-        moments = np.linalg.eigvalsh(symmetric(table.inertia_kg_m2, STATED))
-        if moments[0] < 0 or moments[0] + moments[1] < moments[2] * (1 - 1e-6):
-            raise _no_body(entry, table.inertia_kg_m2)
+        _check_body(entry, OuterHalf(table.mass_kg, table.centre_m, table.inertia_kg_m2))
+
+
+def _check_body(entry: str, body: OuterHalf) -> None:
+    _within(f"{entry}: mass_kg", body.mass_kg, " kg")
+    _finite(f"{entry}: centre_m", body.centre_m, 1e2, "3 lengths in m")
+    moments = np.linalg.eigvalsh(symmetric(body.inertia_kg_m2, STATED))
+    if moments[0] < 0 or moments[0] + moments[1] < moments[2] * (1 - 1e-6):
+        raise _no_body(entry, body.inertia_kg_m2)
 
 
 def _no_body(entry: str, moments: Sequence[float]) -> InputError:

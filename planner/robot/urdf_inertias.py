@@ -1,12 +1,14 @@
 """A robot's links and payloads with other inertias: how identified ones are handed on."""
 
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
-from planner.robot.config import BASE, STATED, Payload
+from planner.robot.config import BASE, STATED, OuterHalf, Payload
+from planner.robot.elastic_model import ElasticModel
 from planner.robot.mesh_files import urdf_source
 from planner.robot.robot import Robot
 from planner.robot.urdf_elements import link_inertia, links_of, state_inertias, write_inertia
@@ -97,6 +99,21 @@ def _moved(inertia: pin.Inertia, placement: pin.SE3, to: np.ndarray) -> pin.Iner
     return pin.Inertia.FromDynamicParameters(
         pin.PseudoInertia.FromMatrix(spread).toDynamicParameters()
     )
+
+
+def outer_halves(
+    robot: Robot, elastic: ElasticModel, unchanged: Sequence[str]
+) -> dict[str, OuterHalf]:
+    """By link that bends what its outer half weighs there; not of `unchanged` bodies."""
+    out = {}
+    for body, values in zip(elastic.bodies, elastic.inertia, strict=True):
+        link = body.removesuffix(OUTER)
+        if link != body:
+            joint, half = _of_whole(robot, link, values)
+            if joint not in unchanged:
+                block = _as_payload(link, pin.Inertia.FromDynamicParameters(half))
+                out[link] = OuterHalf(block.mass, block.com_m, block.inertia_kg_m2)
+    return out
 
 
 def _as_payload(link: str, inertia: pin.Inertia) -> Payload:

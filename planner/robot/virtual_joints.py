@@ -49,8 +49,9 @@ def virtual_model(robot: Robot, inertia_change: np.ndarray | None = None) -> Vir
         if ends[joint][0] == last[joint]:
             bodies.append((name, last[joint], whole))
         else:
-            inner, outer = _halves(whole, -ends[joint][1].translation)
-            half = robot.link_of(name) + OUTER
+            link, at = robot.link_of(name), -ends[joint][1].translation
+            inner, outer = _stated_halves(robot, link, whole, at) or _halves(whole, at)
+            half = link + OUTER
             bodies += [(name, last[joint], inner), (half, ends[joint][0], outer)]
     for number, block in enumerate(robot.config.resonator):
         mass = np.array([block.mass, *np.zeros(9)])
@@ -159,6 +160,29 @@ def ends_of(robot: Robot, link: str) -> tuple[int, int]:
     carried = robot.carries(link)
     assert carried is not None  # otherwise the link has no halves
     return carried
+
+
+def _stated_halves(
+    robot: Robot, link: str, whole: np.ndarray, cut: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """As `_halves` where [[link]] states the outer one, else None.
+
+    Raises InputError where nothing that a body can have would be left for the inner one.
+    """
+    stated = (table.outer_half for table in robot.config.link if table.link == link)
+    half = next(stated, None)
+    if half is None:
+        return None
+    moments = symmetric(half.inertia_kg_m2, STATED)
+    centre = np.array(half.centre_m)
+    inner = whole - pin.Inertia(half.mass_kg, centre, moments).toDynamicParameters()
+    if np.linalg.eigvalsh(pin.PseudoInertia.FromDynamicParameters(inner).toMatrix())[0] <= 0:
+        raise InputError(
+            f"{robot.path}: [[link]] {link} has an outer_half that leaves no possible body of the "
+            f"{whole[0]:.4g} kg of the whole link for the inner half; correct it or leave it out."
+        )
+    outer = pin.Inertia(half.mass_kg, centre - cut, moments)
+    return inner, np.array(outer.toDynamicParameters())
 
 
 def _halves(
