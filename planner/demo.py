@@ -132,8 +132,9 @@ def _said(keys: Mapping[str, Any], errors: Sequence[tuple[float, float, float]])
     first, *later = keys["step_seconds"]
     lines = [
         *keys["remarks"],
-        f"RMSE is of {keys['unused']} poses that were never used. Refit and next "
-        f"proposal: first {first:.2f} s, then at most {max(later, default=0.0):.2f} s.",
+        f"The RMSE is that of the frequencies at {keys['unused']} poses that were never measured. "
+        f"Refitting and proposing the next pose took {first:.2f} s at first, then at most "
+        f"{max(later, default=0.0):.2f} s.",
         f"Campaign: {keys['campaign']}",
         f"Rerun recording: {keys['rrd']} (open with: rerun FILE)",
     ]

@@ -57,7 +57,9 @@ class Claim:
     def displacement(self) -> str:
         """A sentence if the robot stood elsewhere than it was sent; else ""."""
         off = self.joints.apart(self.setpoint_deg, self.joints_deg)
-        return f"The readback of {self.pose} is up to {off} from its setpoint." if off else ""
+        if not off:
+            return ""
+        return f"The readback of {self.pose} is up to {off} from its setpoint; the readback counts."
 
 
 def question_about(claim: Claim, measured: MeasuredPose) -> Question | None:

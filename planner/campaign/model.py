@@ -327,11 +327,13 @@ class Model:
             if percent > 0.3:  # larger than usual
                 check = "Check temperature, clamping and readback."
                 axes = frozenset().union(*(m.axes for m in self.used))
-                partly = [m.pose for m in self.used if m.axes and m.axes < axes]
+                partly = [
+                    f"{m.pose} along {listed(sorted(axes - m.axes))}"
+                    for m in self.used
+                    if m.axes and m.axes < axes
+                ]
                 if partly:
-                    check = (
-                        f"Not every axis was hit at {listed(partly)}: hit the others there, too."
-                    )
+                    check = f"No hits yet at {'; '.join(partly)}: hit there, too."
                 found.append(
                     f"Frequencies scatter by {percent:.1g} % (sd) from visit to visit, more than "
                     f"the modal analysis states: predicted sds include it, further poses do not "

@@ -128,7 +128,9 @@ def check_collision(
     """What collision geometry lacks, and what touches at home (dof,) in rad."""
     collisions, where = Collisions(robot), f"{robot.urdf_path.name}, <collision>"
     if collisions.unchecked is not None:
-        remedy = "Add <collision> boxes or cylinders to its links, or the meshes."
+        remedy = (
+            "Add <collision> boxes or cylinders to the URDF's links, or the mesh files it names."
+        )
         yield CheckRemark("warning", collisions.unchecked, where, remedy)
     if collisions.none_checked:
         return

@@ -93,7 +93,7 @@ def _spring(block: Compliance, inertia: float, where: str) -> Iterator[CheckRema
         remedy = f"Dampers are in {unit}; a ratio of 0.01 to 0.1 is usual."
         yield CheckRemark("warning", text, where, remedy)
     elif block.damping == 0 and block.loss_factor == 0:
-        text = "It has no damping: resonances of simulated FRFs are without bound."
+        text = "It has no damping: resonances of simulated FRFs are infinitely high."
         usual = 2 * USUAL_RATIO * inertia * rate
         remedy = f"A damping ratio of 0.01 to 0.05 is usual, here some {usual:.2g} {unit}."
         yield CheckRemark("warning", text, where, remedy)
