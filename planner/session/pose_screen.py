@@ -88,7 +88,8 @@ class PosePage:
         parts = [ScreenText([Text(title, style="bold reverse")]), *self._place(), *self._verdicts()]
         parts += [ScreenText([None, Text(text)], 5) for text in self.streams[-LAST:]]
         parts += [_unfinished(*one) for one in self.unfinished[-2:]]
-        parts += [ScreenText([None, Text(self.progress)], 6)] if self.progress else []
+        forms = dict.fromkeys((self.progress.partition(". ")[0], self.progress))
+        parts += [ScreenText([None, *map(Text, forms)], 6)] if self.progress else []
         path, most = command(self.folder), WIDTH - 25
         # Of one that is too long for the line the end: folders differ there.
         end = path if len(path) <= most else f"…{path[1 - most :]}"

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 from rich.text import Text
 
 from planner.campaign import events
@@ -25,7 +24,6 @@ from planner.session.hit_verdicts import BAD, Before, HitVerdict, Part, Verdicts
 from planner.session.inbox import Inbox
 from planner.session.pose_screen import PosePage
 from planner.session.screen import Keys, Screen
-from planner.words import significant
 
 if TYPE_CHECKING:
     from planner.report.rerun.campaign import RerunView
@@ -84,8 +82,7 @@ class SessionState:
 
     `asking` is the pose whose question is on the page; `here` are files that looked unsure and are
     right; `left` is the pose where the robot was before; `aside`, by content and row, what could
-    not be imported without the engineer; `history` the overall sd (%) after each measurement;
-    `announced`: the target was.
+    not be imported without the engineer; `announced`: the target was.
     """
 
     visit: PoseInProgress | None = None
@@ -94,7 +91,6 @@ class SessionState:
     here: frozenset[Path] = frozenset()
     aside: frozenset[tuple[str, str]] = frozenset()
     measured: tuple[str, ...] = ()
-    history: tuple[float, ...] = ()
     progress: str = ""
     announced: bool = False
     stop: str = ""
@@ -102,34 +98,21 @@ class SessionState:
 
     def undone(self, state: CampaignState) -> "SessionState":
         """After an act was taken back: what was measured may be gone with it."""
-        kept = [k for k, pose in enumerate(self.measured) if pose in state.measurements]
-        measured = tuple(self.measured[k] for k in kept)
-        history = tuple(self.history[k] for k in kept)
-        return replace(self, measured=measured, history=history, progress="", here=frozenset())
+        measured = tuple(pose for pose in self.measured if pose in state.measurements)
+        return replace(self, measured=measured, progress="", here=frozenset())
 
     def after(
         self, pose: str, model: Model, state: CampaignState, seconds: float, auto: bool
     ) -> "SessionState":
         """After one more measurement, `seconds` into the session."""
-        stop = model.cell.config.stop
-        measured = (*self.measured, pose)
-        overall = float(np.sqrt(np.mean(model.frequency_sd_percent**2)))
-        history = (*self.history, overall)
-        earlier = max(0, len(state.used) - len(history))  # by sessions before this one
-        left = session_text.progress_line(
-            list(history), stop.frequency_sd_percent, seconds / len(measured),
-            stop.measurements_min - earlier,
-        )  # fmt: skip
-        ends = self.stop
+        measured, ends = (*self.measured, pose), self.stop
         if model.done and not self.announced:
             ends = "target reached" if auto else ""
-        if len(state.used) >= stop.measurements_max:
+        if len(state.used) >= model.cell.config.stop.measurements_max:
             ends = "as many measurements as campaign.toml allows"
-        return replace(
-            self, measured=measured, history=history, announced=self.announced or model.done,
-            progress=f"frequency sd over the workspace {significant(overall)} %; {left}",
-            stop=ends,
-        )  # fmt: skip
+        progress = session_text.progress_line(model, seconds / 60 / len(measured))
+        told = self.announced or model.done
+        return replace(self, measured=measured, announced=told, progress=progress, stop=ends)
 
 
 class RerunQueue:

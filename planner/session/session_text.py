@@ -11,7 +11,7 @@ from planner.campaign.labels import found_modes
 from planner.campaign.model import Model
 from planner.report.text import SIMULATED, plain_table, sds_over_workspace, with_sd
 from planner.session.pose_screen import PosePage, remedy_first
-from planner.words import counted, short_name
+from planner.words import counted, short_name, significant
 
 HELP = """\
 a     accept: import the good hits, refit, go on
@@ -27,7 +27,6 @@ q     quit; all is on disk: the same command goes on from here
 NONE_BAD = "No hit is bad: press r again, or R, to refuse all that wait."
 NOTHING_NEW = "Nothing to import yet: no new recording is whole and usable."
 FULLY, SHORTLY = 2, 4  # refusals that are said in full, and those of which is said what to do
-LEAST_TREND, MOST_TOLD = 4, 50  # measurements that make a trend; poses ahead it may be followed
 
 
 def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
@@ -147,50 +146,10 @@ def against_expected(pose: str, model: Model, before: Model | None) -> str:
     return ", ".join(each) or "no modes"
 
 
-def progress_line(
-    history: list[float], target: float, seconds_per_pose: float, minimum: int
-) -> str:
-    """Time per pose, and from how many to how many it takes until the target, by the trend so far.
-
-    Short, for it shares a line of 80 columns. `history` is the overall sd (%) after each
-    measurement; it falls about geometrically.
-    """
-    parts = [f"{seconds_per_pose / 60:.1f} min per pose"]
-    left = poses_to_go(history, target, minimum)
-    if left == (0, 0):
-        parts.append("target reached")
-    elif left is not None:
-        more = f"{_span(left)} more pose{'s' if left != (1, 1) else ''}"
-        minutes = [None if n is None else max(1, round(n * seconds_per_pose / 60)) for n in left]
-        parts.append(f"{more}, {_span((minutes[0] or 1, minutes[1]))} min to go")
-    elif len(history) > 1:
-        parts.append("no trend yet for how many more")
-    return "; ".join(parts)
-
-
-def _span(of: tuple[int, int | None]) -> str:
-    low, high = of
-    if high is None:
-        return f"{low} or more"
-    return f"{low}" if low == high else f"{low} to {high}"
-
-
-def poses_to_go(history: list[float], target: float, minimum: int) -> tuple[int, int | None] | None:
-    """From how many to how many poses until `history` falls to `target`.
-
-    By its mean fall and the standard error of that; None at the end where that is beyond
-    MOST_TOLD, None as a whole where there is no trend to judge by or all of it is beyond.
-    """
-    missing = max(0, minimum - len(history))
-    if history and history[-1] <= target:
-        return missing, missing
-    if len(history) < LEAST_TREND:
-        return None
-    falls = -np.diff(np.log(history))
-    mean, error = float(np.mean(falls)), float(np.std(falls, ddof=1) / np.sqrt(len(falls)))
-    far = float(np.log(history[-1] / target))
-    if mean <= error or far / (mean + error) > MOST_TOLD:
-        return None
-    quick = max(missing, 1, int(np.ceil(far / (mean + error))))
-    slow = int(np.ceil(far / (mean - error)))
-    return quick, (None if slow > MOST_TOLD else max(quick, slow))
+def progress_line(model: Model, minutes: float) -> str:
+    """How far the campaign is, at so many minutes a pose; then what one more would bring."""
+    overall = float(np.sqrt(np.mean(model.frequency_sd_percent**2)))
+    said = f"frequency sd over the workspace {significant(overall)} %; {minutes:.1f} min per pose; "
+    if not model.waits_for:
+        return f"{said}target reached"
+    return f"{said}what lacks: {model.waits_for}. {model.forecast.outlook}".strip()

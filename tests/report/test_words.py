@@ -5,7 +5,6 @@ import io
 from dataclasses import fields, replace
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from rich.console import Console, Group
 
@@ -30,7 +29,6 @@ from planner.report.status import two_answers
 from planner.report.text import UnbrokenConsole, with_sd
 from planner.robot.place_names import place_names, with_names
 from planner.robot.robot import Robot
-from planner.session.session_text import MOST_TOLD, poses_to_go, progress_line
 from planner.words import probable, significant
 from tests.support.plain_arm import make_plain_arm
 
@@ -170,46 +168,6 @@ def test_a_diagnosis_says_small_probabilities_and_the_pose_at_odds():
 def test_a_refit_that_is_farther_off_is_explained():
     assert "peaks are farther off" in MismatchShares(-6.3, 2.1, -34.4, -46.6).sentence
     assert "peaks" not in MismatchShares(-6.3, -9.0, -34.4, -46.6).sentence
-
-
-@pytest.mark.parametrize(
-    ("history", "target", "least", "left", "said"),
-    [
-        ([8.0, 4.0, 2.0, 1.0], 0.25, 3, (2, 2), "2.0 min per pose; 2 more poses, 4 min to go"),
-        ([1.0, 0.1], 0.5, 2, (0, 0), "target reached"),
-        ([0.1], 0.5, 3, (2, 2), ""),
-        ([2.5, 0.7, 34.6, 0.9], 0.1, 3, None, "no trend yet"),
-        ([2.5, 2.49, 2.48, 2.47], 0.1, 3, None, "no trend yet"),
-        ([1.0, 2.0, 4.0, 8.0], 0.1, 3, None, "no trend yet"),
-        ([3.0, 1.0], 0.1, 3, None, "no trend yet"),
-    ],
-)
-def test_poses_and_minutes_to_go_are_said_by_a_trend(history, target, least, left, said):
-    line = progress_line(history, target, 120.0, least)
-    assert said in line
-    if left is None:
-        assert "more pose" not in line
-        assert "to go" not in line
-    else:
-        assert poses_to_go(history, target, least) == left
-
-
-def test_ranges_hold_the_truth_about_as_often_as_they_should():
-    """Falls by a third, with scatter: two standard errors' width holds most of the true counts."""
-    rng, held, told = np.random.default_rng(0), 0, 0
-    for _ in range(300):
-        falls = np.log(1.5) + 0.25 * rng.standard_normal(60)
-        path = 10 * np.exp(-np.cumsum(falls))
-        left = poses_to_go(path[:6].tolist(), 0.3, 3)
-        if left is None or path[5] <= 0.3:
-            continue
-        true = int(np.argmax(path[6:] <= 0.3)) + 1
-        low, high = left
-        assert 1 <= low <= (high or MOST_TOLD) <= MOST_TOLD
-        told += 1
-        held += low <= true and (high is None or true <= high)
-    assert told > 200
-    assert held / told > 0.6
 
 
 def test_a_finding_may_be_taken_for_explanations_without_it():

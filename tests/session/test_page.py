@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.text import Text
 
 from planner.campaign.events import HitRecord, Proposal
+from planner.design.stopping import Forecast
 from planner.recording.joints import JointUnits
 from planner.session.hit_verdicts import HitVerdict
 from planner.session.pose_screen import PosePage, keys_that_do, page_with_hits, remedy_first
@@ -68,7 +69,7 @@ def page():
         (8.12, 12.5, 17.8, 22.3, 28.9, 33.1), (0.12, 0.2, 0.3, 0.4, 0.5, 0.6),
         Path("/home/someone/projects/2026/cell7/measurements/exports/analyser-3"),
         unfinished=(("foreign.uff", FOREIGN), ("half.uff", "half.uff is still being written")),
-        progress="frequency sd over the workspace 1.23 %; 2.3 min per pose; 3 more poses",
+        progress="frequency sd over the workspace 1.23 %; 2.3 min per pose; what lacks: a pose",
         keys=KEYS,
     )  # fmt: skip
 
@@ -205,7 +206,10 @@ def test_hits_without_an_axis_are_told_once_and_leave_the_page_its_head(page):
 def model(sd_percent: float, done: bool = False) -> Any:
     stop = SimpleNamespace(frequency_sd_percent=1.0, measurements_min=3, measurements_max=9)
     cell = SimpleNamespace(config=SimpleNamespace(stop=stop))
-    return SimpleNamespace(cell=cell, done=done, frequency_sd_percent=np.full(2, sd_percent))
+    return SimpleNamespace(
+        cell=cell, done=done, frequency_sd_percent=np.full(2, sd_percent),
+        waits_for="" if done else "2 more poses", forecast=Forecast(1, 2, 0.95, 1, 0.3, 1, 0.4, 2),
+    )  # fmt: skip
 
 
 def state(*poses: str) -> Any:
@@ -214,19 +218,22 @@ def state(*poses: str) -> Any:
 
 def test_an_import_that_was_taken_back_no_longer_counts():
     once = SessionState().after("P1", model(0.5), state("P1"), 60.0, auto=False)
-    assert "2 more poses, 2 min to go" in once.progress
+    wanted = (
+        "frequency sd over the workspace 0.50 %; 1.0 min per pose; what lacks: 2 more poses. One "
+    )
+    assert once.progress == f"{wanted}more pose should bring the RMSE to about 0.60 %."
     undone = once.undone(state())
-    assert (undone.measured, undone.history, undone.progress) == ((), (), "")
+    assert (undone.measured, undone.progress) == ((), "")
     again = undone.after("P1", model(0.5), state("P1"), 60.0, auto=False)
     assert again.measured == ("P1",)
     assert again.progress == once.progress
 
 
-def test_poses_of_earlier_sessions_count_towards_the_least_number():
+def test_a_session_that_reaches_the_target_says_so_and_ends_by_itself():
     resumed = SessionState().after(
         "P4", model(0.5, done=True), state("P1", "P2", "P3", "P4"), 60.0, True
     )
-    assert "more pose" not in resumed.progress
+    assert resumed.progress.endswith("; target reached")
     assert resumed.stop == "target reached"
     assert resumed.announced
 
