@@ -140,12 +140,13 @@ def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObserva
 class FoundMode:
     """A label's mode at a pose, None where it was not found, beside what was expected (Hz, sd).
 
-    NaN where that is not known; `probability` that it is this mode.
+    NaN where that is not known; `probability` that it is this mode, `then` the label it had then.
     """
 
     label: int
     mode: Mode | None
     probability: float
+    then: int | None = None
     expected_hz: float = float("nan")
     sd_hz: float = float("nan")
 
@@ -169,12 +170,14 @@ def found_modes(pose: str, model: "Model", before: "Model | None") -> list[Found
         return found
     # What was expected of a mode, whatever number it had then.
     then = next(p for p in label(before.cell, model.used, before.low) if p.pose == pose)
-    numbers = {mode.frequency_hz: k for k, mode in enumerate(then.modes) if mode is not None}
+    numbers = {mode.frequency_hz: k for k, mode in enumerate(then.modes, 1) if mode is not None}
     hz, sd = (row[0].tolist() for row in before.frequencies(labelled.q[None]))
     out = []
-    for k, one in enumerate(found):
-        was = numbers.get(one.mode.frequency_hz, -1) if one.mode else k
-        out.append(one if was < 0 else replace(one, expected_hz=hz[was], sd_hz=sd[was]))
+    for one in found:
+        was = numbers.get(one.mode.frequency_hz) if one.mode else one.label
+        if was is not None:
+            one = replace(one, then=was, expected_hz=hz[was - 1], sd_hz=sd[was - 1])
+        out.append(one)
     return out
 
 

@@ -10,6 +10,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.events import Question
+from planner.campaign.labels import found_modes
 from planner.errors import RefusedFile
 from planner.report.answer import Answer, plain
 from planner.report.modes import mode_keys
@@ -83,31 +84,29 @@ class PoseImport(Answer):
     @cached_property
     def expected(self) -> tuple[ExpectedMode, ...]:
         """What the model before expected of the modes at the pose, in their order."""
-        if self.report.measurement is None:
+        report = self.report
+        if report.measurement is None:
             return ()
-        joints = self.report.model.cell.robot.joints
-        q = joints.internal([self.report.measurement.joints_deg])
-        return tuple(ExpectedMode.all_of(self.report.model_before.predict(q), 0))
+        joints = report.model.cell.robot.joints
+        stated = joints.internal([report.measurement.joints_deg])
+        stood = next((p.q[None] for p in report.model.labelled if p.pose == report.pose), stated)
+        return ExpectedMode.all_of(report.model_before.predict(stood), 0)
 
     @cached_property
     def modes(self) -> list[dict[str, Any]]:
         """Those of the pose with label and expectation; unlikely ones only where labelled."""
-        report = self.report
-        if report.measurement is None:
-            return []
-        labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
-        named = enumerate(labelled.modes if labelled else ())
-        labels = {mode.frequency_hz: k for k, mode in named if mode}
-        found = []
-        for mode in report.measurement.modes:
-            k = labels.get(mode.frequency_hz)
-            known = (None, None, None)
-            if labelled is not None and k is not None:
-                known = k + 1, float(labelled.probability[k]), self.expected[k]
-            if k is not None or mode.likely:
-                said = dict(zip(("label", "label_probability", "expected"), known, strict=True))
-                found.append(mode_keys(mode, **said))
-        return found
+        report, modes = self.report, []
+        found = found_modes(report.pose, report.model, report.model_before)
+        known = {one.mode.frequency_hz: one for one in found if one.mode}
+        for mode in report.measurement.modes if report.measurement else ():
+            one = known.get(mode.frequency_hz)
+            if one is None and not mode.likely:
+                continue
+            label, sure, then = (one.label, one.probability, one.then) if one else (None,) * 3
+            expected = None if then is None else self.expected[then - 1]
+            said = {"label": label, "label_probability": sure, "expected": expected}
+            modes.append(mode_keys(mode, **said))
+        return modes
 
     def parts(self) -> list[RenderableType]:
         """Modes beside what was expected, remarks, and the change of the model, if there is any."""

@@ -22,12 +22,14 @@ from planner.campaign.events import (
     Withdrawn,
 )
 from planner.campaign.import_checks import Claim, hit_again, suspected_drift, unexpected_modes
+from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement, fold
 from planner.effects.resonator import LinkResonator
 from planner.proof.deviation import Deviation
 from planner.proof.load import load_truth
 from planner.recording.joints import JointUnits
+from planner.report.imports import PoseImport
 from planner.robot.arm_chain import arm_chain
 from tests.support.outside import record, told
 from tests.support.plain_arm import make_plain_arm, plain_campaign
@@ -155,6 +157,15 @@ def test_modes_are_compared_by_what_they_are_where_their_numbers_moved(monkeypat
     found = labels.found_modes("P002", model, before)
     np.testing.assert_array_equal([one.expected_hz for one in found], [9.23, 14.65, np.nan])
     assert not unexpected_modes(before, model, "P002")
+    own = tuple(
+        msgspec.structs.replace(mode, shape=((1.0, 0.0), (0.0, 0.0)))
+        for mode in modes(9.24, 14.66, 19.0)
+    )
+    measurement = Measurement("P002", (), (), own)
+    answer = PoseImport(ImportReport("P002", measurement, before, model))
+    answer.__dict__["expected"] = ("of 4.0 Hz", "of 9.23 Hz", "of 14.65 Hz")
+    told = [(mode["label"], mode["expected"]) for mode in answer.modes]
+    assert told == [(1, "of 9.23 Hz"), (2, "of 14.65 Hz"), (3, None)]
 
 
 def test_a_mode_that_no_pose_has_shown_is_told():
