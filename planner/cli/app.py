@@ -79,13 +79,13 @@ def import_(
     Example: planner import cell7 exports/P001
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.imports import ImportedPoses
+    from planner.report.imports import imported
 
     with progress_bar("importing", quiet=as_json) as progress:
         campaign = Campaign(directory)
         reports = campaign.import_paths(tuple(paths), pose, progress, from_names)
-    answer = ImportedPoses.of(reports, campaign.state.simulated)
-    return respond(answer, as_json, refusals(answer.refused, answer.to_be_answered(directory)))
+    answer, refused, asked = imported(reports, directory, campaign.state.simulated)
+    return respond(answer, as_json, refusals(refused, asked))
 
 
 @app.command(name="status")

@@ -72,12 +72,12 @@ def confirm(
     Example: planner confirm cell7 P014 --at P009
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.imports import ImportedPoses
+    from planner.report.imports import imported
 
     campaign = Campaign(directory)
     report = campaign.confirm(pose) if at is None else campaign.move(pose, at)
-    answer = ImportedPoses.of((report,), campaign.state.simulated)
-    return respond(answer, as_json, refusals(answer.refused, answer.to_be_answered(directory)))
+    answer, refused, asked = imported((report,), directory, campaign.state.simulated)
+    return respond(answer, as_json, refusals(refused, asked))
 
 
 def undo(directory: Directory, as_json: AsJson = False) -> int:

@@ -1,6 +1,6 @@
 """Answer of `import`: which hits were accepted, the modes they give, and what changed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +12,7 @@ from rich.text import Text
 from planner.campaign.events import Question
 from planner.campaign.labels import found_modes
 from planner.errors import RefusedFile
-from planner.report.answer import Answer, plain
+from planner.report.answer import Done, plain
 from planner.report.modes import mode_keys
 from planner.report.predictions import ExpectedMode
 from planner.report.text import SIMULATED, remarks, table, with_sd
@@ -41,19 +41,20 @@ def asked_of(pose: str, question: Question | None) -> dict[str, Any] | None:
 
 
 @dataclass(frozen=True, eq=False)
-class PoseImport(Answer):
+class PoseImport:
     """What one pose's hits gave; hits by what a later `model` has learned, where one is given."""
 
     report: "ImportReport"
     model: "Model | None" = None
 
-    def to_json(self) -> dict[str, Any]:
+    @property
+    def keys(self) -> dict[str, Any]:
         """Sds (count,) in % are over the workspace; "expected" of held hits at the stated pose.
 
         "copies" are those already imported that are other files of the same data.
         """
         report, measurement = self.report, self.report.measurement
-        return plain({
+        return {
             "pose": report.pose, "accepted": [hit.file for hit in report.accepted],
             "refused": self.refused, "already_imported": [one.file for one in report.already],
             "modes": self.modes, "refit_seconds": report.refit_seconds,
@@ -63,7 +64,7 @@ class PoseImport(Answer):
             "simulated": self.simulated, "hit_errors": report.hit_errors(self.model),
             "question": asked_of(report.pose, report.question),
             "expected": self.expected if report.question else (), "copies": self.copies,
-        })  # fmt: skip
+        }  # fmt: skip
 
     @property
     def refused(self) -> tuple[RefusedFile, ...]:
@@ -96,9 +97,11 @@ class PoseImport(Answer):
     def modes(self) -> list[dict[str, Any]]:
         """Those of the pose with label and expectation; unlikely ones only where labelled."""
         report, modes = self.report, []
+        if report.measurement is None:
+            return modes
         found = found_modes(report.pose, report.model, report.model_before)
         known = {one.mode.frequency_hz: one for one in found if one.mode}
-        for mode in report.measurement.modes if report.measurement else ():
+        for mode in report.measurement.modes:
             one = known.get(mode.frequency_hz)
             if one is None and not mode.likely:
                 continue
@@ -162,46 +165,26 @@ class PoseImport(Answer):
         return f"{used} accepted, {len(self.refused) - held} refused{waiting}"
 
 
-@dataclass(frozen=True)
-class ImportedPoses(Answer):
-    """Answer of `import`, one entry a pose in recording order.
+def imported(
+    reports: "Sequence[ImportReport]", directory: Path, simulated: bool
+) -> tuple[Done, list[RefusedFile], list[str]]:
+    """Answer of `import`, all that was refused, and what is asked, with commands that answer it.
 
-    `habits`: what all hits of the campaign have in common, told once some are new.
+    A pose after the other in recording order; the top-level keys speak of the last, "hit_errors"
+    of all, by what all of them taught. "habits": what all hits of the campaign have in common, told
+    once some are new. `simulated`: whether the campaign has simulated recordings.
     """
-
-    poses: tuple[PoseImport, ...]
-    habits: tuple[str, ...] = ()
-    simulated: bool = False  # whether the campaign has simulated recordings
-
-    @classmethod
-    def of(cls, reports: "tuple[ImportReport, ...]", simulated: bool = False) -> "ImportedPoses":
-        """Of what `Campaign.import_paths` gave; hits are told by what all of them taught."""
-        model = reports[-1].model
-        poses = tuple(PoseImport(report, model) for report in reports)
-        common = model.systematic_hit_errors if any(one.accepted for one in reports) else ()
-        return cls(poses, common, simulated or any(pose.simulated for pose in poses))
-
-    def to_json(self) -> dict[str, Any]:
-        """The top-level keys speak of the last pose, "hit_errors" of all; "poses" of each."""
-        each = [pose.to_json() for pose in self.poses]
-        hits = [hit for pose in each for hit in pose["hit_errors"]]
-        return {**each[-1], "hit_errors": hits, "habits": plain(self.habits), "poses": each}
-
-    @property
-    def refused(self) -> tuple[RefusedFile, ...]:
-        """Of all poses."""
-        return tuple(file for pose in self.poses for file in pose.refused)
-
-    def to_be_answered(self, directory: Path) -> list[str]:
-        """What is asked of held hits, with the commands that answer it, a line each."""
-        held = ((pose.report.pose, pose.report.question) for pose in self.poses)
-        return [how_to_answer(directory, pose, asked) for pose, asked in held if asked]
-
-    def text(self) -> Group:
-        """Pose by pose."""
-        parts = [part for pose in self.poses for part in pose.parts()]
-        parts += [Text(f"  {habit}") for habit in self.habits]
-        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+    model = reports[-1].model
+    poses = [PoseImport(report, model) for report in reports]
+    habits = model.systematic_hit_errors if any(one.accepted for one in reports) else ()
+    each = [pose.keys for pose in poses]
+    hits = [hit for keys in each for hit in keys["hit_errors"]]
+    parts = [part for pose in poses for part in pose.parts()]
+    parts += [Text(f"  {habit}") for habit in habits]
+    parts += [SIMULATED] if simulated or any(pose.simulated for pose in poses) else []
+    answer = Done({**each[-1], "hit_errors": hits, "habits": habits, "poses": each}, Group(*parts))
+    asked = [how_to_answer(directory, r.pose, r.question) for r in reports if r.question]
+    return answer, [file for pose in poses for file in pose.refused], asked
 
 
 def how_to_answer(directory: Path | str, pose: str, asked: Question) -> str:

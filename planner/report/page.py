@@ -92,10 +92,10 @@ def page(campaign: Campaign, kept_diagnosis: Path | None = None) -> str:
         else nothing,
         over_workspace=model.workspace_prediction,
         left_out=left_out_figure(*found_without(model))
-        if now["leave_one_out"].values
+        if now["leave_one_out"]["values"]
         else None,
         **map_pictures(campaign),
-        **frf_pictures(campaign, now["leave_one_out"].worst),
+        **frf_pictures(campaign, now["leave_one_out"]["worst"]),
         springs=[spring.cells for spring in now["springs"]],
         spring_columns=COLUMNS,
         springs_say=NOT_KNOWN,

@@ -11,7 +11,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.model_status import DecisionStatus, found_without, left_out
+from planner.campaign.model_status import decision_status, found_without, left_out
 from planner.campaign.state import Measurement
 from planner.errors import InputError
 from planner.report.answer import Done
@@ -51,7 +51,7 @@ def _of_model(model: "Model") -> dict[str, Any]:
         "frequency_sd_percent": model.frequency_sd_percent,
         "target_frequency_sd_percent": cell.config.stop.frequency_sd_percent,
         "done": bool(model.done), "forecast": model.forecast, "remarks": model.remarks,
-        "leave_one_out": left_out(model), "decision": DecisionStatus.of(model),
+        "leave_one_out": left_out(model), "decision": decision_status(model),
         "joint_units": cell.robot.joints.declared, "springs": refitted_springs(model),
         "masses": refitted_masses(model), "waits_for": model.waits_for,
         "frf_sd_percent": model.frf_sd_percent, "not_predicted": model.not_predicted,
@@ -74,7 +74,7 @@ def status(
     beside = two_answers(believed["springs"], read_diagnosis(kept)) if kept else ""
 
     def draw():
-        if not believed["leave_one_out"].values:
+        if not believed["leave_one_out"]["values"]:
             return {}
         from planner.report.campaign_plots import left_out_figure
 
@@ -168,8 +168,8 @@ def _lines(believed: Mapping[str, Any], keys: Mapping[str, Any]) -> list[str]:
             f"program stopped before the import: import again."
         )
     lines += [unanswered(h["question"]["text"]) for h in keys["held"]]
-    lines += [believed["decision"].text] if believed["decision"] else []
-    lines += [*keys["remarks"], *keys["leave_one_out"].text]
+    lines += [believed["decision"]["text"]] if believed["decision"] else []
+    lines += [*keys["remarks"], *keys["leave_one_out"]["text"]]
     told = by_reason((r["file"], r["reason"]) for r in keys["refused"])
     return lines + [f"refused {one}" for one in told]
 

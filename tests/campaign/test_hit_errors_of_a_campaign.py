@@ -16,7 +16,7 @@ from planner.dataset.store import Store
 from planner.fit.hit_error_fit import VisitHitErrors
 from planner.measurement.nuisances import Tolerances
 from planner.replay import replay
-from planner.report.imports import ImportedPoses
+from planner.report import imports
 from tests.support.hit_error_cases import MissedCell, missed_cell
 
 NORMAL95 = 1.959964
@@ -43,7 +43,7 @@ def cell(tmp_path_factory):
 
 def test_every_accepted_hit_is_told(cell):
     made, campaign, reports = cell
-    answer = ImportedPoses.of(reports).to_json()
+    answer = imports.imported(reports, campaign.directory, False)[0].to_json()
     rows = (made.recordings / "recordings.csv").read_text().splitlines()[1:]
     files = [str(made.recordings / row.split(",")[-1]) for row in rows]
     assert [hit["file"] for hit in answer["hit_errors"]] == files
