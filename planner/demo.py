@@ -16,6 +16,7 @@ from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
 from planner.campaign.importing import ImportReport
 from planner.campaign.labels import label, observations
+from planner.compare.curves import score
 from planner.compare.pool import PoseFiles, make, poses_of
 from planner.dataset.visits import recordings_in
 from planner.errors import InputError, NoPoseLeftError
@@ -24,7 +25,6 @@ from planner.report.answer import Done
 from planner.report.text import SIMULATED, number, table
 
 NAME = "kr240_plane"
-Z_95 = 1.959964  # two-sided 95 % of a normal distribution
 
 
 def shipped(name: str) -> Path:
@@ -103,14 +103,13 @@ def _errors(
     Of all modes together, then of each, at q (n, dof) in rad where `truth` (n, modes) is in Hz.
     """
     expected, simulated = campaign.model.predict(q), campaign.cell.frozen.simulate(q).frequency_hz
-    inside = np.abs(truth - expected.frequency_hz) <= Z_95 * expected.frequency_sd_hz
-    found = []
-    for k in (slice(None), *range(truth.shape[1])):
-        known = np.isfinite(truth[:, k])
-        share = float(np.mean(inside[:, k][known])) if known.any() else float("nan")
-        of = (expected.frequency_hz, simulated)
-        ours, alone = (rmse_percent(hz[:, k], truth[:, k]) for hz in of)
-        found.append((ours, alone, share))
+    found, exact = [], np.zeros_like(truth)
+    for k in (slice(None), *(slice(k, k + 1) for k in range(truth.shape[1]))):
+        at = np.s_[:, k]
+        ours = score(expected.frequency_hz[at], expected.frequency_sd_hz[at], truth[at], exact[at])
+        alone = score(simulated[at], exact[at], truth[at], exact[at])
+        both = ours.frequency_rmse_percent, alone.frequency_rmse_percent
+        found.append((*both, ours.coverage95))
     return found
 
 
@@ -167,8 +166,3 @@ def _measured_hz(cell: Cell, poses: Sequence[PoseFiles], progress: ProgressCallb
         progress(f"checking on unused pose {i + 1}", i / len(poses))
         found.append(make(None, pose).measurement)
     return observations(cell, label(cell, tuple(found))).frequency_hz
-
-
-def rmse_percent(predicted: np.ndarray, truth: np.ndarray) -> float:
-    """Root mean square relative error in %, over entries (any shape) known in `truth`."""
-    return float(100 * np.sqrt(np.nanmean((predicted / truth - 1) ** 2)))

@@ -1,6 +1,5 @@
 """Rebuilding a campaign from its log, step by step, and checking each step."""
 
-import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -125,8 +124,7 @@ def _check(
         return (*_compare(numbers[0], numbers[1], names), None)
     if isinstance(event, Imported) and model is not None:
         return _check_import(campaign, event, before, model)
-    kind = re.sub(r"(?<!^)(?=[A-Z])", " ", type(event).__name__).lower()
-    return "kept", kind, None
+    return "kept", event.kind, None
 
 
 def _check_import(

@@ -14,6 +14,11 @@ REPLACED = "replaced by a newer"
 class Event(msgspec.Struct, frozen=True, tag_field="kind"):
     """Base of every entry of the log."""
 
+    @property
+    def kind(self) -> str:
+        """What it is, as the log has it."""
+        return str(self.__struct_config__.tag)
+
 
 class Configured(Event, frozen=True, tag="configured"):
     """The campaign was started, or its campaign.toml or robot folder was changed by hand.

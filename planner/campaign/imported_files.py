@@ -10,9 +10,9 @@ from planner.campaign.state import CampaignState
 from planner.dataset.screened_files import Source
 from planner.dataset.visits import table_folders
 from planner.errors import InputError
-from planner.recording.folder import CHANNELS, TABLE, files_in, read_recordings
+from planner.recording.folder import CHANNELS, TABLE, files_in, joint_columns, read_recordings
 from planner.recording.joints import JointUnits
-from planner.recording.points import StatedPoints
+from planner.recording.points import ANYWHERE, StatedPoints
 from planner.recording.read import READERS
 from planner.recording.records import PoseRow
 from planner.robot.robot import Robot
@@ -47,9 +47,9 @@ class KnownFile:
 
 
 def sort_paths(
-    paths: tuple[Path, ...], robot: Robot, pose: str | None, default_pose: str | None
+    paths: tuple[Path, ...], robot: Robot | None, pose: str | None, default_pose: str | None
 ) -> tuple[ImportedFiles, ...]:
-    """Deliveries by pose, in recording order.
+    """Deliveries by pose, in recording order, of a `robot` if one is known.
 
     A folder with recordings.csv says itself which pose a file belongs to (`pose` then picks one,
     or renames the only one), and so do its subfolders; a file that is named is what the table
@@ -75,7 +75,7 @@ def sort_paths(
         told = {source.path.resolve() for one in listed for source in one.sources}
         bare += [file for file in files if file.resolve() not in told]
     if bare:
-        stated = StatedPoints(names=robot.points)
+        stated = StatedPoints() if robot is None else StatedPoints(names=robot.points)
         sources = tuple(Source(path, str(path), stated=stated) for path in bare)
         name = pose or default_pose or ""
         deliveries.append(ImportedFiles(name, None, sources, said=pose is not None))
@@ -83,7 +83,7 @@ def sort_paths(
 
 
 def _from_tables(
-    path: Path, folders: tuple[Path, ...], robot: Robot, pose: str | None
+    path: Path, folders: tuple[Path, ...], robot: Robot | None, pose: str | None
 ) -> list[ImportedFiles]:
     """Deliveries of folders, each with a table of its own; `pose` picks one, or renames the only.
 
@@ -101,7 +101,7 @@ def _from_tables(
 
 
 def _listed(
-    folder: Path, files: Sequence[Path], robot: Robot, pose: str | None
+    folder: Path, files: Sequence[Path], robot: Robot | None, pose: str | None
 ) -> list[ImportedFiles]:
     """Those of some files that a folder's table lists, if it has one; of `pose` alone, if given."""
     table = folder / TABLE
@@ -117,9 +117,10 @@ def _listed(
     return [one for one in found if one.sources]
 
 
-def _from_table(folder: Path, robot: Robot) -> list[ImportedFiles]:
+def _from_table(folder: Path, robot: Robot | None) -> list[ImportedFiles]:
     rows: dict[str, list[PoseRow]] = {}
-    for row in read_recordings(folder, robot.joints, robot.points, bare=True):
+    known = (joint_columns(folder), ANYWHERE) if robot is None else (robot.joints, robot.points)
+    for row in read_recordings(folder, *known, bare=True):
         rows.setdefault(row.pose, []).append(row)
     return [
         ImportedFiles(

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,19 +31,6 @@ if TYPE_CHECKING:
     from planner.campaign.decision import Decision
 
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
-
-
-@dataclass(frozen=True)
-class RepeatedPose:
-    """The measured pose whose repetition gains more than any new one.
-
-    Gains are reductions of the mean relative variance.
-    """
-
-    pose: str
-    gain: float
-    gain_of_a_new_pose: float
-    text: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,8 +183,11 @@ class Model:
             return self.decision is not None and self.decision.sure(stop.probability)
         return self.forecast.reached >= stop.probability
 
-    def repeat(self) -> RepeatedPose | None:
-        """The measured pose that gains most from more hits; None where a new pose gains more."""
+    def repeat(self) -> dict[str, Any] | None:
+        """The measured pose that gains most from more hits; None where a new pose gains more.
+
+        Gains are reductions of the mean relative variance.
+        """
         if not self.labelled:
             return None
         outputs, q = self.acquisition_inputs[0], np.array([pose.q for pose in self.labelled])
@@ -210,7 +200,8 @@ class Model:
             return None
         pose = self.labelled[best].pose
         text = f"First hit {pose} again, as often as before: that tells more than a new pose."
-        return RepeatedPose(pose, float(gain[best]), new, text)
+        gained = float(gain[best])
+        return {"pose": pose, "gain": gained, "gain_of_a_new_pose": new, "text": text}
 
     def _predict(
         self,

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from itertools import takewhile
 
-import msgspec
-
 from planner.campaign import events
 from planner.campaign.events import Entry
 from planner.campaign.state import fold, taken_back
@@ -57,10 +55,7 @@ def last_undone(entries: Sequence[Entry]) -> tuple[Entry | None, tuple[Entry, ..
 
 def in_short(entry: Entry | None) -> str:
     """What an act was, and of which pose, where it is of one: "imported P004"; "" of none."""
-    if entry is None:
-        return ""
-    told = msgspec.to_builtins(entry.event)
-    return f"{told['kind']} {told.get('pose', '')}".strip()
+    return f"{entry.event.kind} {getattr(entry.event, 'pose', '')}".strip() if entry else ""
 
 
 def in_words(entry: Entry) -> str:
@@ -89,6 +84,5 @@ def in_words(entry: Entry) -> str:
             return f"{counted(len(event.files), 'late file')} taken as {event.pose}'s"
         like = f", like those of {event.pose}" if event.at else ""
         return f"{counted(len(event.files), 'file')} shown at {event.at or event.pose}{like}"
-    told = msgspec.to_builtins(event)
-    reason = f": {told['reason']}" if told.get("reason") else ""
-    return f"{told['kind']} {told['pose']}{reason}"
+    reason = getattr(event, "reason", "")
+    return f"{event.kind} {event.pose}{f': {reason}' if reason else ''}"

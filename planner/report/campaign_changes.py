@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import msgspec
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
@@ -75,11 +74,6 @@ def example(folder: str, robot: str, campaign: str, files: Sequence[str]) -> Don
     return Done(keys, Group(Text(said), *(command_line("  ", *words) for words in commands)))
 
 
-def kind_of(entry: Entry) -> str:
-    """What an entry of the log is, as the log has it."""
-    return msgspec.to_builtins(entry.event)["kind"]
-
-
 def taken_back(entries: Sequence[Entry], what: str) -> Done:
     """Answer of `undo` and `redo` (`what`: "undone", "redone"): the log's entry that was taken back
     or holds again, and those that went with it.
@@ -87,7 +81,7 @@ def taken_back(entries: Sequence[Entry], what: str) -> Done:
     entry, *others = entries
     said, words = in_words(entry), [in_words(other) for other in others]
     follow = f"; with it: {', '.join(words)}" if words else ""
-    keys = {what: entry.seq, "event": kind_of(entry), "what": said, "with_it": words}
+    keys = {what: entry.seq, "event": entry.event.kind, "what": said, "with_it": words}
     return Done(keys, f"{what.capitalize()}: {said}{follow} (entry {entry.seq} of the log).")
 
 

@@ -5,7 +5,7 @@ And the manual.
 
 import inspect
 from collections.abc import Iterator, Sequence
-from dataclasses import astuple, dataclass
+from typing import Any
 
 import msgspec
 from msgspec import inspect as types
@@ -28,36 +28,6 @@ FILES: dict[str, type[msgspec.Struct]] = {
 REQUIRED = "required"
 
 
-@dataclass(frozen=True)
-class SchemaEntry:
-    """One entry: what it takes, and what holds where it is left out."""
-
-    name: str
-    takes: str
-    default: str
-
-
-@dataclass(frozen=True)
-class SchemaChoice:
-    """A name that an entry takes, and what it stands for."""
-
-    name: str
-    about: str
-
-
-@dataclass(frozen=True)
-class SchemaTable:
-    """A table of a file; "" for what stands at its top. `about` may have several sentences.
-
-    `choices` are what its `name` or `model` may be, where that is one of several.
-    """
-
-    name: str
-    about: str
-    entries: tuple[SchemaEntry, ...]
-    choices: tuple[SchemaChoice, ...] = ()
-
-
 def schema(file: str) -> Done:
     """Tables of one of FILES in the file's order, and a JSON Schema for editors.
 
@@ -68,11 +38,11 @@ def schema(file: str) -> Done:
     kind, parts = FILES[file], list[RenderableType]()
     tables, name = tuple(tables_of(kind)), f"{file}.toml"
     for one in tables:
-        columns, title = ("entry", "takes", "if left out"), one.name or name
-        rows = (map(Text, astuple(entry)) for entry in one.entries)
+        columns, title = ("entry", "takes", "if left out"), one["name"] or name
+        rows = (map(Text, entry.values()) for entry in one["entries"])
         made = table(Text(title, style="bold"), *columns, rows=rows, words=True)
-        parts += [made, Text(one.about)]
-        parts += [Text(f"  {choice.name}: {choice.about}") for choice in one.choices]
+        parts += [made, Text(one["about"])]
+        parts += [Text(f"  {': '.join(choice.values())}") for choice in one["choices"]]
         parts.append(Text(""))
     keys = {"file": name, "tables": tables, "json_schema": msgspec.json.schema(kind)}
     return Done(keys, Group(*parts))
@@ -92,35 +62,42 @@ def manual(commands: Sequence[tuple[str, str]]) -> str:
     return rendered("manual.html", title="planner: manual", files=files, commands=told)
 
 
-def tables_of(kind: type[msgspec.Struct], name: str = "") -> Iterator[SchemaTable]:
-    """The table of a type, then those of its entries that are tables themselves."""
+def tables_of(kind: type[msgspec.Struct], name: str = "") -> Iterator[dict[str, Any]]:
+    """The table of a type, then those of its entries that are tables themselves.
+
+    "name" is "" for what stands at the file's top; "about" may have several sentences. Of "entries"
+    "default" is what holds where one is left out; "choices" are what the table's name or model may
+    be, where that is one of several.
+    """
     info = types.type_info(kind)
     assert isinstance(info, types.StructType)
     entries, inner = [], []
     for field in info.fields:
         struct, form = _struct(field.type)
         if struct is None:
-            entries.append(SchemaEntry(field.encode_name, _takes(field.type), _default(field)))
+            takes, default = _takes(field.type), _default(field)
+            entries.append({"name": field.encode_name, "takes": takes, "default": default})
         else:
             path = f"{name.strip('[]')}.{field.encode_name}".strip(".")
             inner.append((struct, form.format(path)))
     about = " ".join((inspect.getdoc(kind) or "").split())
-    yield SchemaTable(name, about, tuple(entries), _choices(kind))
+    choices = [{"name": name, "about": said} for name, said in _choices(kind).items()]
+    yield {"name": name, "about": about, "entries": entries, "choices": choices}
     for struct, path in inner:
         yield from tables_of(struct, path)
 
 
-def _choices(kind: type[msgspec.Struct]) -> tuple[SchemaChoice, ...]:
-    """Acquisitions or models, where the table names one."""
+def _choices(kind: type[msgspec.Struct]) -> dict[str, str]:
+    """Acquisitions or models, where the table names one, and what each stands for."""
     if kind is SurrogateTable:
         from planner.surrogate.frequency_models import MODELS
 
-        return tuple(SchemaChoice(name, model.sentence) for name, model in MODELS.items())
+        return {name: model.sentence for name, model in MODELS.items()}
     if kind is not AcquisitionTable:
-        return ()
+        return {}
     from planner.design.propose import ACQUISITIONS, DESCRIPTIONS, DESIGNS
 
-    return tuple(SchemaChoice(name, DESCRIPTIONS[name]) for name in (*ACQUISITIONS, *DESIGNS))
+    return {name: DESCRIPTIONS[name] for name in (*ACQUISITIONS, *DESIGNS)}
 
 
 def _struct(given: types.Type) -> tuple[type[msgspec.Struct] | None, str]:

@@ -1,7 +1,6 @@
 """Pages of HTML without any other file: the report of a campaign, the manual, studies."""
 
 import base64
-from dataclasses import astuple
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,7 +29,7 @@ def rendered(template: str, **values: object) -> str:
     made = jinja2.Environment(
         loader=loader, autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined
     )
-    made.filters |= {"inline": inline, "cells": astuple}
+    made.filters |= {"inline": inline, "cells": dict.values}
     made.filters |= {one.__name__: one for one in (local_time, significant, with_sd)}
     return made.get_template(template).render(version=__version__, **values)
 

@@ -1,6 +1,6 @@
 """From recordings to the answer of `modes`: one pose, any points, unlabelled FRFs, responses."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from msgspec import UNSET
 
+from planner.campaign.imported_files import sort_paths
 from planner.dataset.frf_set import FrfSet
 from planner.dataset.measure import DEFAULT_BAND_HZ, measure
 from planner.dataset.screened_files import Source, in_parts, told_of_files
@@ -22,10 +23,10 @@ from planner.modal.modes import ModalModel
 from planner.modal.operating import operating_modes
 from planner.modal.transfer_functions import modes_from_transfer_functions
 from planner.recording.channel_faults import lost_samples
-from planner.recording.folder import CHANNELS, TABLE, files_in, joint_columns, read_recordings
+from planner.recording.folder import TABLE
 from planner.recording.hits import without_unit
-from planner.recording.points import ANYWHERE, Dof, PointNames
-from planner.recording.read import READERS, read
+from planner.recording.points import Dof, PointNames
+from planner.recording.read import read
 from planner.recording.records import TimeRecord
 from planner.recording.uff import read_geometry
 from planner.report.answer import Done
@@ -64,34 +65,11 @@ def sources_of(paths: Sequence[Path], from_names: bool = False) -> tuple[Source,
     A file is what the table beside it says, if that lists it. With `from_names` FRFs have what they
     do not state of their places from the files' names.
     """
-    found: list[Source] = []
-    named = dict.fromkeys(path.parent for path in paths if path.is_file())
-    beside = {folder: _listed(folder, {p.name for p in paths}) for folder in named}
-    for path in paths:
-        if path.name == TABLE:  # says what the files beside it are
-            found += _listed(path.parent) if len(paths) == 1 else []
-        elif (path / TABLE).is_file():
-            found += _listed(path)
-        elif path.is_dir():
-            found += [Source(file, str(file)) for file in files_in(path, READERS)]
-        elif path.is_file():
-            told = [s for s in beside[path.parent] if s.path.resolve() == path.resolve()]
-            found += told or ([Source(path, str(path))] if path.name != CHANNELS else [])
-        else:
-            raise InputError(f"{path} does not exist; name the recordings of one pose.")
-    return tuple(replace(source, from_name=from_names) for source in found)
-
-
-def _listed(folder: Path, names: Collection[str] | None = None) -> list[Source]:
-    """What a folder's table says of its files; none, where it has no table or one without any of
-    `names`. Points are those that the table says, of no robot."""
-    table = folder / TABLE
-    text = table.read_text(encoding="utf-8", errors="replace") if table.is_file() else ""
-    if not text or (names is not None and not any(name in text for name in names)):
-        return []
-    rows = read_recordings(folder, joint_columns(folder), ANYWHERE, bare=True)
-    told = map(Source.of, rows)
-    return [replace(s, stated=replace(s.stated, names=PointNames())) for s in told]
+    # A table among files says what these are; points are those that it names, of no robot.
+    given = tuple(path for path in paths if path.name != TABLE or len(paths) == 1)
+    every = (s for one in sort_paths(given, None, None, None) for s in one.sources)
+    named = ((s, replace(s.stated, names=PointNames())) for s in every)
+    return tuple(replace(s, stated=stated, from_name=from_names) for s, stated in named)
 
 
 def _titled(files: Sequence[str]) -> str:

@@ -70,7 +70,7 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> Done:
         "done": bool(model.done), "waits_for": model.waits_for,
     }  # fmt: skip
     lacks = model.waits_for, model.not_predicted
-    said = standing(forecast, *lacks, repeat.text if repeat else "")
+    said = standing(forecast, *lacks, repeat["text"] if repeat else "")
     said = " ".join(filter(None, (said, places.sentence if places else "")))
     return Done(keys, Group(*parts, Text(said), *_then(campaign.directory, found[0].pose)))
 

@@ -15,7 +15,6 @@ from planner.progress import ProgressCallback
 from planner.recording.joints import JointUnits
 from planner.replay import Step, replay
 from planner.report.answer import Done
-from planner.report.campaign_changes import kind_of
 from planner.report.text import table
 
 
@@ -58,7 +57,7 @@ def _answer(
     told = [
         {
             "seq": one.entry.seq, "time": one.entry.time,
-            "event": kind_of(one.entry), "check": one.check, "detail": one.detail,
+            "event": one.entry.event.kind, "check": one.check, "detail": one.detail,
             "measurements": len(one.model.labelled),
             "frequency_sd_percent": one.model.frequency_sd_percent, "instead": one.instead,
         }
@@ -87,7 +86,7 @@ def _table(steps: Sequence[Step], joints: JointUnits) -> Table:
         sd = "  ".join(f"{v:.2f}" for v in step.model.frequency_sd_percent)
         poses = [joints.listed(pose.joints_deg, 0) for pose in step.instead]
         made.add_row(
-            str(step.entry.seq), kind_of(step.entry), step.check, step.detail, sd,
+            str(step.entry.seq), step.entry.event.kind, step.check, step.detail, sd,
             *(["\n".join(poses)] if asked else []),
             style="red" if step.check == "differs" else None,
         )  # fmt: skip
