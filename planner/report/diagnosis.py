@@ -77,31 +77,16 @@ def established_effects(
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class EffectAtPlace:
-    """An effect of the library; "none" and "unknown" are nowhere (None)."""
-
-    effect: str
-    at: str | None
+def at_places(places: Sequence[tuple[str, str | None]]) -> tuple[dict[str, str | None], ...]:
+    """Effects of the library with their places; "none" and "unknown" are nowhere (None)."""
+    return tuple({"effect": effect, "at": at} for effect, at in places)
 
 
-@dataclass(frozen=True)
-class RankedExplanation:
-    """Effects that are there together; `effect` and `at` are all their names in one."""
-
-    effect: str
-    at: str | None
-    probability: float
-    effects: tuple[EffectAtPlace, ...]
-
-    @classmethod
-    def of(
-        cls, places: Sequence[tuple[str, str | None]], probability: float
-    ) -> "RankedExplanation":
-        """Of the effects' names and places."""
-        names, at = [name for name, _ in places], [at for _, at in places if at]
-        each = tuple(EffectAtPlace(*place) for place in places)
-        return cls(" + ".join(names), " + ".join(at) or None, probability, each)
+def ranked(places: Sequence[tuple[str, str | None]], probability: float) -> dict[str, Any]:
+    """Effects that are there together; "effect" and "at" are all their names in one."""
+    names, at = [name for name, _ in places], [at for _, at in places if at]
+    both = {"effect": " + ".join(names), "at": " + ".join(at) or None}
+    return both | {"probability": probability, "effects": at_places(places)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +101,9 @@ class DiagnosisReport(Answer):
 
     verdict: str
     findings: tuple[EstablishedEffect, ...]
-    candidates: tuple[RankedExplanation, ...]
+    candidates: tuple[dict[str, Any], ...]
     undecided: tuple[tuple[tuple[str, str | None], ...], ...]
-    sets: tuple[tuple[EffectAtPlace, ...], ...]
+    sets: tuple[tuple[dict[str, str | None], ...], ...]
     where: MismatchPlaces
     fit: ThreefoldSimilarity
     held_out: ThreefoldSimilarity
@@ -135,7 +120,7 @@ class DiagnosisReport(Answer):
     campaign_robot: Path | None = field(default=None, metadata=NOT_IN_JSON)
     plots: tuple[str, ...] = ()
     rrd: str | None = field(default=None, metadata=NOT_IN_JSON)
-    closest: tuple[EffectAtPlace, ...] = field(default=(), metadata=NOT_IN_JSON)
+    closest: tuple[tuple[str, str | None], ...] = field(default=(), metadata=NOT_IN_JSON)
     next: NextHit | None = None
     next_sensor: ExtraSensor | None = None
     odd_pose: "OddPose | None" = None
@@ -211,8 +196,8 @@ class DiagnosisReport(Answer):
         heading = "What was considered (an effect can be part of several)"
         made = table(heading, "effect", "at", "probability")
         for c in self.candidates[:SHOWN]:
-            at = with_names(c.at or "–", self.place_names)
-            made.add_row(c.effect.replace("_", " "), at, probable(c.probability))
+            at = with_names(c["at"] or "–", self.place_names)
+            made.add_row(c["effect"].replace("_", " "), at, probable(c["probability"]))
         parts += [made, self._agreement(), Text(self.shares.sentence)]
         more = (self.next, self.next_sensor)
         parts += [Text(one.sentence, style="bold") for one in more if one]
@@ -234,13 +219,13 @@ class DiagnosisReport(Answer):
         first = self.candidates[0] if self.candidates else None
         if self.verdict != "unexplained" or not self.closest or first is None:
             return VERDICTS[self.verdict]
-        near = listed([f"{e.effect.replace('_', ' ')} at {e.at}" for e in self.closest])
+        near = listed([f"{name.replace('_', ' ')} at {at}" for name, at in self.closest])
         near = with_names(near, self.place_names)
         agrees = self.fit.explained.frac
         return (
             f"No effects that planner knows explain the recordings (probability "
-            f"{probable(first.probability)}). Closest, together: {near}; with them the FRFs' FRAC "
-            f"is {100 * agrees:.2f} %. They may be most of the cause, with something unknown "
+            f"{probable(first['probability'])}). Closest, together: {near}; with them the FRFs' "
+            f"FRAC is {100 * agrees:.2f} %. They may be most of the cause, with something unknown "
             f"beside them. Before you repair anything, check "
             f"sensor, hammer and the stated poses, and look for what else touched or hung on the "
             f"robot."
@@ -319,9 +304,9 @@ def diagnosis_report(found: "Diagnosis", odd: "OddPose | None" = None) -> Diagno
         verdict=verdict.verdict,
         findings=established_effects(found, undecided, names),
         place_names=names,
-        candidates=tuple(RankedExplanation.of(c.places, c.probability) for c in verdict.candidates),
+        candidates=tuple(ranked(c.places, c.probability) for c in verdict.candidates),
         undecided=tuple(c.places for c in undecided) if len(undecided) > 1 else (),
-        sets=tuple(tuple(EffectAtPlace(*one) for one in members) for members in verdict.sets),
+        sets=tuple(map(at_places, verdict.sets)),
         where=MismatchPlaces.of(place, recorded.poses),
         fit=found.fitted,
         held_out=replace(found.held_out or ThreefoldSimilarity(), poses=aside),
@@ -331,6 +316,6 @@ def diagnosis_report(found: "Diagnosis", odd: "OddPose | None" = None) -> Diagno
         remarks=tuple(filter(None, (*recorded.remarks, *found.remarks, masses))),
         simulated=recorded.simulated,
         odd_pose=odd,
-        closest=tuple(EffectAtPlace(*e.place) for e in verdict.effects if e.counts),
+        closest=tuple(e.place for e in verdict.effects if e.counts),
         diagnosis=found,
     )

@@ -16,12 +16,8 @@ from planner.diagnosis.mismatch import MismatchShares
 from planner.diagnosis.odd_pose import OddPose
 from planner.diagnosis.verdict import Candidate
 from planner.measurement.agreement import Similarity
-from planner.report.diagnosis import (
-    DiagnosisReport,
-    EffectAtPlace,
-    RankedExplanation,
-    established_effects,
-)
+from planner.report.diagnosis import DiagnosisReport, established_effects
+from planner.report.diagnosis import ranked as ranked_effects
 from planner.report.imports import PoseImport
 from planner.report.predictions import ExpectedMode
 from planner.report.springs import RefittedSpring
@@ -90,9 +86,9 @@ def report(verdict: str, *ranked) -> DiagnosisReport:
     sides = (Similarity(f, f) for f in (0.9, 0.95, 0.9999))
     given = {
         "verdict": verdict, "findings": (), "remarks": (), "plots": (), "simulated": False,
-        "candidates": tuple(RankedExplanation.of(p, q) for p, q in ranked),
+        "candidates": tuple(ranked_effects(p, q) for p, q in ranked),
         "fit": ThreefoldSimilarity(*sides), "place_names": {}, "seconds": 1.0,
-        "closest": tuple(EffectAtPlace(*one) for p, _ in ranked for one in p if one[1]),
+        "closest": tuple(one for p, _ in ranked for one in p if one[1]),
         "where": Said(), "shares": Said(), "held_out": Said(),
     }  # fmt: skip
     return DiagnosisReport(**(empty | given))
