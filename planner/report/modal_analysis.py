@@ -67,7 +67,14 @@ def sources_of(paths: Sequence[Path], from_names: bool = False) -> tuple[Source,
     """
     # A table among files says what these are; points are those that it names, of no robot.
     given = tuple(path for path in paths if path.name != TABLE or len(paths) == 1)
-    every = (s for one in sort_paths(given, None, None, None) for s in one.sources)
+    deliveries = sort_paths(given, None, None, None)
+    poses = list(dict.fromkeys(one.pose for one in deliveries if one.row))
+    if len(poses) > 1:
+        raise InputError(
+            f"{paths[0]}: what is named is of several poses ({', '.join(poses[:4])}); name the "
+            f"recordings of one, or one folder whose {TABLE} lists all."
+        )
+    every = (s for one in deliveries for s in one.sources)
     named = ((s, replace(s.stated, names=PointNames())) for s in every)
     return tuple(replace(s, stated=stated, from_name=from_names) for s, stated in named)
 

@@ -58,6 +58,12 @@ def test_a_folder_of_one_pose_is_that_pose(folder, tmp_path):
     assert found == pytest.approx([mode["frequency_hz"] for mode in answer["modes"]], rel=1e-3)
 
 
+def test_folders_of_several_poses_are_not_averaged_as_one(folder, tmp_path):
+    for name in ("A21", "A22"):
+        part_of(folder, tmp_path / "deep" / name, (name,))
+    assert "several poses (A21, A22)" in refused("modes", tmp_path / "deep")
+
+
 def test_poses_named_twice_in_scripts_that_fonts_lack(folder, tmp_path):
     """The robot stood still between two poses; their names draw no warning."""
     names = {"1": "\u59ff\u52bf", "2": "\U00012000 2"}  # by the number of the hit
