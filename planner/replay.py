@@ -50,20 +50,11 @@ class Step:
     instead: tuple[Proposal, ...] = ()
 
 
-class _Cells:
-    """Cells by configuration; earlier versions of the robot folder are laid out again."""
-
-    def __init__(self, campaign: Campaign, stack: ExitStack):
-        self._campaign, self._stack = campaign, stack
-        self._cells: dict[bytes, Cell] = {}
-
-    def of(self, configured: Configured) -> Cell:
-        key = msgspec.json.encode((configured.config, configured.robot))
-        if key not in self._cells:
-            root = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
-            store.restore_robot(self._campaign.directory, configured.robot, root / store.ROBOT)
-            self._cells[key] = Cell.load(root / configured.config.robot, configured.config)
-        return self._cells[key]
+def _cell(directory: Path, configured: Configured, stack: ExitStack) -> Cell:
+    """Of a configuration; earlier versions of the robot folder are laid out again."""
+    root = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+    store.restore_robot(directory, configured.robot, root / store.ROBOT)
+    return Cell.load(root / configured.config.robot, configured.config)
 
 
 def replay(
@@ -79,23 +70,24 @@ def replay(
     if until is not None and not 1 <= until <= len(entries):
         raise InputError(f"The log has entries 1 to {len(entries)}; {until} is not among them.")
     with ExitStack() as stack:
-        cells = _Cells(campaign, stack)
-        # A model follows from configuration and measurements: skips and undone acts leave it alone.
-        models: dict[tuple[int, tuple[Measurement, ...]], Model] = {}
+        # By configuration the cell, what was found, and models: those follow from measurements in
+        # use alone, so that skips and undone acts leave them alone.
+        known: dict[bytes, tuple[Cell, Recall, dict[tuple[Measurement, ...], Model]]] = {}
         model = None
-        recalls: dict[int, Recall] = {}
         for entry in entries[:until]:
             before, after = fold(entries[: entry.seq - 1]), fold(entries[: entry.seq])
             check, detail, measured = _check(campaign, entry, before, model)
             instead = _instead(entry, before, model, acquisition)
             assert after.configured is not None
-            cell = cells.of(after.configured)
-            key = id(cell), after.used
-            recall = recalls.setdefault(id(cell), in_memory())
-            if key not in models:
+            key = msgspec.json.encode((after.configured.config, after.configured.robot))
+            if key not in known:
+                loaded = _cell(campaign.directory, after.configured, stack)
+                known[key] = loaded, in_memory(), {}
+            cell, recall, models = known[key]
+            if after.used not in models:
                 kept = store.KeptRecordings(campaign.directory, cell)
-                models[key] = build(cell, after, kept.hits, recall)
-            model = models[key]
+                models[after.used] = build(cell, after, kept.hits, recall)
+            model = models[after.used]
             yield Step(entry, check, detail, after, model, measured, instead)
 
 

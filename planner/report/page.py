@@ -19,7 +19,7 @@ from planner.report.answer import Done
 from planner.report.campaign_plots import frf_pictures, left_out_figure, map_pictures
 from planner.report.html import rendered, write_page
 from planner.report.proposals import standing
-from planner.report.springs import COLUMNS, NOT_KNOWN
+from planner.report.springs import COLUMNS, NOT_KNOWN, spring_cells
 from planner.report.status import chapter, diagnosis_of, status
 from planner.report.text import SIMULATED, number, with_sd
 from planner.robot.link_bodies import guessed_masses
@@ -96,7 +96,7 @@ def page(campaign: Campaign, kept_diagnosis: Path | None = None) -> str:
         else None,
         **map_pictures(campaign),
         **frf_pictures(campaign, now["leave_one_out"]["worst"]),
-        springs=[spring.cells for spring in now["springs"]],
+        springs=list(map(spring_cells, now["springs"])),
         spring_columns=COLUMNS,
         springs_say=NOT_KNOWN,
         diagnosis=found,

@@ -57,55 +57,15 @@ class IdentifiedSpring:
         )
 
 
-@dataclass(frozen=True)
-class RefittedSpring:
-    """A spring of the simulation as robot.toml states it and as refitted to all recordings.
+def refitted_springs(model: "Model") -> list[dict[str, Any]]:
+    """Springs that were fitted, as robot.toml states them and as refitted to all recordings.
 
-    `stated` is None for one that robot.toml lacks; `identifiable`: the recordings tell of it.
+    "stated" is None for one that robot.toml lacks; "identifiable": the recordings tell of it. None
+    where the simulation does not learn.
     """
-
-    joint: str
-    axis: tuple[float, ...]
-    stated: float | None
-    stiffness: float
-    stiffness_sd: float
-    unit: str
-    identifiable: bool
-
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """A row of the table."""
-        return (
-            f"{self.joint} {_axis(self.axis)}",
-            "not stated" if self.stated is None else with_sd(self.stated, None),
-            with_sd(self.stiffness, self.stiffness_sd),
-            self.unit,
-            "yes" if self.identifiable else "no",
-        )
-
-
-@dataclass(frozen=True)
-class RefittedLink:
-    """The mass of a link with what is mounted on it, as stated and as refitted, with sds."""
-
-    link: str
-    stated_kg: float
-    stated_sd_kg: float
-    mass_kg: float
-    mass_sd_kg: float
-
-    @property
-    def cells(self) -> tuple[str, str, str]:
-        """A row of the table."""
-        stated = with_sd(self.stated_kg, self.stated_sd_kg)
-        return self.link, stated, with_sd(self.mass_kg, self.mass_sd_kg)
-
-
-def refitted_springs(model: "Model") -> tuple[RefittedSpring, ...]:
-    """One entry for each spring that was fitted; none where the simulation does not learn."""
     fit = model.low.identified_robot
     if fit is None:
-        return ()
+        return []
     blocks, stated = fit.identified.simulation.robot.config.compliance, fit.stated
     told = {
         number: estimate
@@ -113,25 +73,45 @@ def refitted_springs(model: "Model") -> tuple[RefittedSpring, ...]:
         for number in estimate.blocks
         if number < stated or estimate in fit.unstated
     }  # fmt: skip
-    return tuple(
-        RefittedSpring(
-            blocks[n].joint, tuple(blocks[n].axis), blocks[n].stiffness if n < stated else None,
-            estimate.value, estimate.sd, estimate.unit, estimate.identifiable,
-        )
+    return [
+        {"joint": blocks[n].joint, "axis": tuple(blocks[n].axis),
+         "stated": blocks[n].stiffness if n < stated else None, "stiffness": estimate.value,
+         "stiffness_sd": estimate.sd, "unit": estimate.unit, "identifiable": estimate.identifiable}
         for n, estimate in sorted(told.items())
-    )  # fmt: skip
+    ]  # fmt: skip
 
 
-def refitted_masses(model: "Model") -> tuple[RefittedLink, ...]:
-    """Of links whose masses the recordings tell; none where the simulation does not learn."""
+def spring_cells(spring: Mapping[str, Any]) -> tuple[str, ...]:
+    """A row of a table of COLUMNS."""
+    stated = spring["stated"]
+    return (
+        f"{spring['joint']} {_axis(spring['axis'])}",
+        "not stated" if stated is None else with_sd(stated, None),
+        with_sd(spring["stiffness"], spring["stiffness_sd"]),
+        spring["unit"],
+        "yes" if spring["identifiable"] else "no",
+    )
+
+
+def refitted_masses(model: "Model") -> list[dict[str, Any]]:
+    """Of links whose masses the recordings tell, with what is mounted on them, and sds.
+
+    None where the simulation does not learn.
+    """
     from planner.fit.departures import known_masses  # status needs none of what it imports
 
     fit = model.low.identified_robot
-    known = known_masses(fit.posterior) if fit else []
-    return tuple(
-        RefittedLink(m.link, m.stated_kg, m.sd_kg, m.stated_kg + m.more_kg, left_kg)
-        for m, left_kg in known
-    )
+    return [
+        {"link": m.link, "stated_kg": m.stated_kg, "stated_sd_kg": m.sd_kg,
+         "mass_kg": m.stated_kg + m.more_kg, "mass_sd_kg": left_kg}
+        for m, left_kg in (known_masses(fit.posterior) if fit else ())
+    ]  # fmt: skip
+
+
+def mass_cells(mass: Mapping[str, Any]) -> tuple[str, str, str]:
+    """A row of a table of MASS_COLUMNS."""
+    stated = with_sd(mass["stated_kg"], mass["stated_sd_kg"])
+    return mass["link"], stated, with_sd(mass["mass_kg"], mass["mass_sd_kg"])
 
 
 def identified_springs(robot: "Robot", found: "Identification") -> tuple[IdentifiedSpring, ...]:

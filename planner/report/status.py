@@ -22,9 +22,10 @@ from planner.report.springs import (
     COLUMNS,
     MASS_COLUMNS,
     NOT_KNOWN,
-    RefittedSpring,
+    mass_cells,
     refitted_masses,
     refitted_springs,
+    spring_cells,
 )
 from planner.report.text import ending, sds_over_workspace, table
 from planner.words import by_reason, counted, listed, local_time, significant
@@ -110,11 +111,11 @@ def _tables(keys: Mapping[str, Any]) -> list[RenderableType]:
     parts: list[RenderableType] = [measured]
     if keys["springs"]:
         title = "Stiffnesses of the simulation, refitted to all recordings"
-        each = (spring.cells for spring in keys["springs"])
-        parts += [table(title, *COLUMNS, rows=each), Text(f"  {NOT_KNOWN}")]
+        rows = map(spring_cells, keys["springs"])
+        parts += [table(title, *COLUMNS, rows=rows), Text(f"  {NOT_KNOWN}")]
     if keys["masses"]:
         title = "Masses that the recordings tell, of each link with what is mounted on it"
-        parts.append(table(title, *MASS_COLUMNS, rows=(mass.cells for mass in keys["masses"])))
+        parts.append(table(title, *MASS_COLUMNS, rows=map(mass_cells, keys["masses"])))
     return parts + ([] if keys["models"] is msgspec.UNSET else models_text(keys["models"]))
 
 
@@ -233,7 +234,7 @@ def read_diagnosis(file: Path) -> dict[str, Any]:
     return found
 
 
-def two_answers(springs: Sequence[RefittedSpring], found: Mapping[str, Any]) -> str:
+def two_answers(springs: Sequence[Mapping[str, Any]], found: Mapping[str, Any]) -> str:
     """Why the campaign's model has other springs than a diagnosis names; "" where it has not.
 
     `springs` are those of the model, `found` is the diagnosis' answer as JSON.
@@ -242,7 +243,7 @@ def two_answers(springs: Sequence[RefittedSpring], found: Mapping[str, Any]) -> 
     # Springs that robot.toml states the model refits, too: they tell nothing apart.
     said = [one["at"] for one in found["findings"] if one["effect"] != "joint_stiffness"]
     told = {names.get(at, at) for at in said if at}
-    added = {spring.joint for spring in springs if spring.stated is None} - told
+    added = {spring["joint"] for spring in springs if spring["stated"] is None} - told
     if not added or not told:
         return ""
     return (

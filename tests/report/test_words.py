@@ -20,7 +20,6 @@ from planner.report.diagnosis import DiagnosisReport, established_effects
 from planner.report.diagnosis import ranked as ranked_effects
 from planner.report.imports import PoseImport
 from planner.report.predictions import ExpectedMode
-from planner.report.springs import RefittedSpring
 from planner.report.status import two_answers
 from planner.report.text import UnbrokenConsole, with_sd
 from planner.robot.place_names import place_names, with_names
@@ -137,9 +136,8 @@ def test_joints_have_the_names_that_the_robot_has_for_them(tmp_path):
     ],
 )
 def test_a_model_and_a_diagnosis_that_differ_are_one_answer(found, said):
-    axis = (1.0, 0.0, 0.0)
     springs = [
-        RefittedSpring(joint, axis, stated, 1e6, 1e4, "N·m/rad", True)
+        {"joint": joint, "stated": stated}
         for joint, stated in (("A2", 2e6), ("A5", None), ("base", None))
     ]
     each = [dict(zip(("effect", "at"), one.split(), strict=True)) for one in found]
