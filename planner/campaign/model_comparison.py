@@ -6,7 +6,7 @@ identified from all poses: that helps all models that use it alike.
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -21,36 +21,21 @@ from planner.surrogate.modal_surrogate import ModalObservations, fit_primary
 INSIDE = 1.96  # sds of the interval that holds 95 %
 
 
-@dataclass(frozen=True)
-class LeftOutModel:
-    """How a model predicts measured frequencies from the other poses.
-
-    `log_density` is that of all values of ln f left out one by one, `log_evidence` that of all
-    together, None where hyperparameters are not averaged; `seconds` a fit to all poses takes.
-    """
-
-    model: str
-    about: str
-    rmse_percent: float
-    coverage95: float
-    log_density: float
-    log_evidence: float | None
-    seconds: float
-    campaign: bool = False
-
-
 # Mean and sd (m,) of ln f at the pose left out; evidence of all, seconds of the fit.
 Fitted = tuple[np.ndarray, np.ndarray, float | None, float]
 
 
-def compared_models(
-    model: Model, progress: ProgressCallback = no_progress
-) -> tuple[LeftOutModel, ...]:
-    """All usable ones, the likeliest for poses left out first; () with fewer than two poses."""
+def compared_models(model: Model, progress: ProgressCallback = no_progress) -> list[dict[str, Any]]:
+    """How each usable one predicts measured frequencies from the other poses, the likeliest first.
+
+    "log_density" is that of all values of ln f left out one by one, "log_evidence" that of all
+    together, None where hyperparameters are not averaged; "seconds" a fit to all poses takes.
+    "campaign": it is the campaign's own. None with fewer than two poses.
+    """
     n, config = len(model.seen.x), model.cell.config
     usable = [m for m in MODELS if model.low.simulation or not MODELS[m].simulation]
     if n < 2:
-        return ()
+        return []
     seen, discrepancy, belief = model.seen, model.low.discrepancy, model.low.belief
     kernel = config.surrogate.kernel
     points = {name: simulated_elsewhere(model.cell, model.low, name) for name in usable}
@@ -70,27 +55,25 @@ def compared_models(
     done = parallel_map(without, items, lambda i, k: progress(items[i][0], k / len(items)))
     found = dict(zip(items, done, strict=True))
     rows = [
-        _row(name, seen, found[name, -1][2], [found[name, i] for i in range(n)]) for name in usable
+        _row(name, seen, found[name, -1][2], [found[name, i] for i in range(n)])
+        | {"campaign": name == config.surrogate.model}
+        for name in usable
     ]
-    rows = [replace(row, campaign=row.model == config.surrogate.model) for row in rows]
-    return tuple(sorted(rows, key=lambda row: -row.log_density))
+    return sorted(rows, key=lambda row: -row["log_density"])
 
 
 def _row(
     name: str, seen: ModalObservations, log_evidence: float | None, each: Sequence[Fitted]
-) -> LeftOutModel:
+) -> dict[str, Any]:
     mean, sd, _, seconds = zip(*each, strict=True)
     off = np.array(mean) - np.log(seen.frequency_hz)
     sd = np.hypot(sd, seen.frequency_sd_hz / seen.frequency_hz)
     known = np.isfinite(off)
     off, sd = off[known], sd[known]
     density = -0.5 * np.sum((off / sd) ** 2 + np.log(2 * np.pi * sd**2))
-    return LeftOutModel(
-        name,
-        MODELS[name].sentence,
-        float(100 * np.sqrt(np.mean(np.expm1(off) ** 2))),
-        float(np.mean(np.abs(off) <= INSIDE * sd)),
-        float(density),
-        log_evidence,
-        float(np.median(seconds)),  # the first compiles
-    )
+    return {
+        "model": name, "about": MODELS[name].sentence,
+        "rmse_percent": float(100 * np.sqrt(np.mean(np.expm1(off) ** 2))),
+        "coverage95": float(np.mean(np.abs(off) <= INSIDE * sd)), "log_density": float(density),
+        "log_evidence": log_evidence, "seconds": float(np.median(seconds)),  # the first compiles
+    }  # fmt: skip

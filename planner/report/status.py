@@ -32,7 +32,6 @@ from planner.words import by_reason, counted, listed, local_time, significant
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
-    from planner.campaign.model_comparison import LeftOutModel
     from planner.campaign.state import CampaignState
 
 KEPT = "diagnosis.json"  # as `diagnose --out` writes it
@@ -61,7 +60,7 @@ def _of_model(model: "Model") -> dict[str, Any]:
 
 def status(
     campaign: Campaign, diagnosis: Path | None = None, pictures: Pictures | None = None,
-    models: "Sequence[LeftOutModel] | None" = None,
+    models: Sequence[Mapping[str, Any]] | None = None,
 ) -> Done:  # fmt: skip
     """Answer of `status`, of a campaign as it is now beside a kept `diagnosis` (default: its own).
 
@@ -187,22 +186,22 @@ def _still_refused(state: "CampaignState") -> list[dict[str, str]]:
     return [{"pose": pose, "file": hit.file, "reason": hit.reason} for pose, hit in told]
 
 
-def models_text(rows: "Sequence[LeftOutModel]") -> list[RenderableType]:
+def models_text(rows: Sequence[Mapping[str, Any]]) -> list[RenderableType]:
     """Models side by side, and which one predicts poses left out best."""
     if not rows:
         return [Text("Models can be compared once two poses are measured.")]
     columns = "model", "RMSE (%)", "in 95 %", "log density", "log evidence", "fit (s)"
     made = table("Natural frequencies of each pose, predicted from the others alone", *columns)
     for row in rows:
-        evidence = "" if row.log_evidence is None else f"{row.log_evidence:.1f}"
+        evidence = "" if row["log_evidence"] is None else f"{row['log_evidence']:.1f}"
         made.add_row(
-            row.model + (" ★" if row.campaign else ""), significant(row.rmse_percent),
-            f"{100 * row.coverage95:.0f} %", f"{row.log_density:.1f}", evidence,
-            significant(row.seconds),
+            row["model"] + (" ★" if row["campaign"] else ""), significant(row["rmse_percent"]),
+            f"{100 * row['coverage95']:.0f} %", f"{row['log_density']:.1f}", evidence,
+            significant(row["seconds"]),
         )  # fmt: skip
-    best, used = rows[0], next((row for row in rows if row.campaign), rows[0])
-    powers = (best.log_density - used.log_density) / math.log(10)
-    said = f"Likeliest for poses left out: {best.model}, {best.about}."
+    best, used = rows[0], next((row for row in rows if row["campaign"]), rows[0])
+    powers = (best["log_density"] - used["log_density"]) / math.log(10)
+    said = f"Likeliest for poses left out: {best['model']}, {best['about']}."
     if best is not used:
         said += f" The campaign's own (★) is less likely by {powers:.1f} powers of ten."
     return [made, Text(said)]
