@@ -6,12 +6,13 @@ import pickle
 import signal
 import threading
 import time
-from collections import OrderedDict, deque
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from functools import cache
-from typing import Any, Generic, TypeVar
+from typing import Any, TypeVar
 from uuid import uuid4
 
 import cloudpickle
@@ -19,7 +20,6 @@ from loky import ProcessPoolExecutor
 from threadpoolctl import threadpool_limits
 
 POLL_S = 0.02
-KEPT = 8  # functions that a helper remembers
 NO_LEAK = {"LOKY_MAX_MEMORY_LEAK_SIZE": "1e15"}  # what it caches, in bytes, is none
 T = TypeVar("T")
 R = TypeVar("R")
@@ -40,93 +40,70 @@ def parallel_map(
     `done` is told the number of each item done here, and how many are done by now. BLAS has one
     thread meanwhile: the products are too small for more.
     """
-    waiting, out = deque(range(len(items))), {}
+    waiting, out = deque(range(len(items))), dict[int, R]()
 
-    def here(number: int) -> None:
-        out[number] = work(items[number])
-        done(number, len(out))
+    def here(numbers: Iterable[int]) -> None:
+        try:
+            for number in numbers:
+                out[number] = work(items[number])
+                done(number, len(out))
+        finally:
+            waiting.clear()  # after an error nothing more is begun
 
     with threadpool_limits(1):
-        if len(items) < 2 or not _has_cores():
-            _take(waiting, waiting.popleft, here)
-        else:
-            asked = _Asked(work, items)
-
-            def elsewhere(number: int) -> None:
-                out[number] = asked(number)
-
+        if len(items) > 1 and _has_cores():
+            # At once: later, work that is done here may be changing what it holds.
+            pickled = cloudpickle.dumps(work), [cloudpickle.dumps(item) for item in items]
             with ThreadPoolExecutor(1) as other:
-                helped = other.submit(_once_begun, waiting, elsewhere)
-                _take(waiting, waiting.popleft, here)
+                helped = other.submit(_helped, waiting, *pickled, out)
+                here(_taken(waiting.popleft))
                 helped.result()
+        here(number for number in range(len(items)) if number not in out)
     return [out[number] for number in range(len(items))]
 
 
-def _take(waiting: deque[int], following: Callable[[], int], call: Callable[[int], None]) -> None:
-    """One after the other, as long as there are any; after an error nothing more is begun."""
+def _taken(following: Callable[[], int]) -> Iterator[int]:
+    """One after the other, as long as there are any."""
+    with suppress(IndexError):
+        while True:
+            yield following()
+
+
+def _helped(waiting: deque[int], work: bytes, items: Sequence[bytes], out: dict[int, Any]) -> None:
+    """Have the helper do items from the end, once there is one, until it dies."""
+    pool, begun = _helper()
+    while waiting and not begun.done():
+        wait([begun], timeout=POLL_S)
+    if not waiting:
+        return
+    name = uuid4().hex
     try:
-        while waiting:
-            try:
-                number = following()
-            except IndexError:  # the other was faster
-                return
-            call(number)
+        pool.submit(_keep, name, work).result()
+        for number in _taken(waiting.pop):
+            out[number] = pool.submit(_answer, name, items[number]).result()
+    except BrokenProcessPool:
+        _helper.cache_clear()
     except BaseException:
         waiting.clear()
         raise
+    finally:
+        with suppress(BrokenProcessPool):
+            pool.submit(_forget, name)
 
 
-def _once_begun(waiting: deque[int], call: Callable[[int], None]) -> None:
-    """From the end, once there is a helper."""
-    _, begun = _helper()
-    while waiting and not begun.done():
-        wait([begun], timeout=POLL_S)
-    if waiting:
-        _take(waiting, waiting.pop, call)
+_kept: dict[str, Callable] = {}  # in the helper, which is sent each work once
 
 
-class _Asked(Generic[T, R]):
-    """Work that is done by the helper, to whom it is sent once; here if that dies.
-
-    All is pickled at once: later, work that is done here may be changing what it holds.
-    """
-
-    def __init__(self, work: Callable[[T], R], items: Sequence[T]):
-        self.work, self.items, self.name, self.sent = work, items, uuid4().hex, False
-        self.pickled = cloudpickle.dumps(work)
-        self.pickled_items = [cloudpickle.dumps(item) for item in items]
-
-    def __call__(self, number: int) -> R:
-        whole, item = None if self.sent else self.pickled, self.pickled_items[number]
-        try:
-            found = _helper()[0].submit(_answer, self.name, whole, item).result()
-        except BrokenProcessPool:
-            _helper.cache_clear()
-            self.sent = False
-            return self.work(self.items[number])
-        except _ForgottenError:
-            self.sent = False
-            return self(number)
-        self.sent = True
-        return found
+def _keep(name: str, work: bytes) -> None:
+    _kept[name] = pickle.loads(work)
 
 
-class _ForgottenError(Exception):
-    """The helper no longer has what it was sent."""
+def _answer(name: str, item: bytes) -> Any:
+    return _kept[name](pickle.loads(item))
 
 
-_known: OrderedDict[str, Callable] = OrderedDict()
-
-
-def _answer(name: str, work: bytes | None, item: bytes) -> Any:
-    """In the helper."""
-    if work is not None:
-        _known[name] = pickle.loads(work)
-        while len(_known) > KEPT:
-            _known.popitem(last=False)
-    if name not in _known:
-        raise _ForgottenError
-    return _known[name](pickle.loads(item))
+def _forget(name: str) -> None:
+    del _kept[name]
 
 
 def cores() -> int:

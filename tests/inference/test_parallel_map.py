@@ -83,10 +83,11 @@ def test_what_is_done_is_told(helper):
     assert all(a < b <= 9 for a, b in pairwise(counts))
 
 
-def test_a_helper_that_forgot_is_told_again(helper):
-    first = module._Asked(abs, [-2])
-    for asked in (first, *(module._Asked(abs, [-2]) for _ in range(module.KEPT)), first):
-        assert asked(0) == 2
+def test_a_helper_keeps_nothing(helper):
+    parallel_map(abs, range(-9, 0))
+    with pytest.raises(IndexError):
+        parallel_map(fail, range(1000))
+    assert module._helper()[0].submit(lambda: module._kept).result() == {}
 
 
 class Lazy:
