@@ -34,6 +34,7 @@ from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import UNSCALED, ModalModel, Mode
 from planner.robot.robot import Robot
+from planner.toml_file import wrong_entry
 
 if TYPE_CHECKING:
     from planner.surrogate.frf_bands import ModalPrediction
@@ -64,7 +65,8 @@ class AskTell:
             try:
                 config = msgspec.convert(dict(tables), CampaignConfig)
             except msgspec.ValidationError as error:
-                raise InputError(f"{TABLES} are not valid ({error}); correct them.") from None
+                said = wrong_entry(TABLES, "campaign.toml", tables, CampaignConfig, str(error))
+                raise InputError(said) from None
             check_config(config, Path(TABLES))
         else:
             config = load_campaign_config(Path(tables))

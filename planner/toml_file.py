@@ -15,6 +15,12 @@ from planner.errors import InputError
 
 T = TypeVar("T")
 LONGEST = 40  # of a wrong value that is repeated
+NAMES = "name", "joint", "link", "effect"  # entries by which one finds a table of a list
+
+
+def limited(unit: str = "", **limits: Any) -> msgspec.Meta:
+    """Of a number's type: what it must be above (`gt`), at least, below or at most (ge, lt, le)."""
+    return msgspec.Meta(**limits, extra={"unit": f" {unit}".rstrip()})
 
 
 def read_toml_text(path: Path, name: str) -> str:
@@ -42,17 +48,20 @@ def load_toml(path: Path, kind: type[T], name: str) -> T:
     try:
         found = msgspec.toml.decode(text, type=kind)
     except msgspec.ValidationError as error:
-        raise InputError(wrong_entry(path, name, text, kind, str(error))) from error
+        raise InputError(
+            wrong_entry(path, name, msgspec.toml.decode(text), kind, str(error))
+        ) from error
     except (msgspec.DecodeError, RecursionError) as error:
         raise InputError(f"{path} is not a valid {name} ({error}); correct it.") from None
     except ValueError:  # of more digits than Python turns into an integer
         raise InputError(
             f"{path} is not a valid {name} (a number has thousands of digits); correct it."
         ) from None
-    for steps, value in _numbers(msgspec.to_builtins(found)):
+    given = msgspec.to_builtins(found)
+    for steps, value in _numbers(given):
         if not math.isfinite(value):
             raise InputError(
-                f"{path}: {_entry(steps, numbered=True)} is {value}; it must be a finite number."
+                f"{path}: {_entry(steps, given=given)} is {value}; it must be a finite number."
             )
     return found
 
@@ -65,8 +74,8 @@ _WANTED = {
 }  # fmt: skip
 
 
-def wrong_entry(path: Path, name: str, text: str, kind: type, fault: str) -> str:
-    """What msgspec found wrong in a TOML file, as a sentence that names the entry."""
+def wrong_entry(path: Path | str, name: str, given: Any, kind: type, fault: str) -> str:
+    """What msgspec found wrong in a TOML file's values, as a sentence that names the entry."""
     what, _, at = fault.partition(" - at `$")
     steps = [step for step in re.findall(r"\.\.\.|\w+", at) if step]
     unknown = re.search(r"unknown field `([^`]+)`", what)
@@ -82,26 +91,31 @@ def wrong_entry(path: Path, name: str, text: str, kind: type, fault: str) -> str
         return f"{path}: {_entry([*steps, missing[1]])} is missing; add it."
     if what.startswith("Invalid enum value") and (choices := _choices(kind, steps)):
         said = f"{', '.join(choices[:-1])} or {choices[-1]}"
-        return f"{path}: {_entry(steps)} must be {said}, not {_given(text, steps)}."
+        return f"{path}: {_entry(steps)} must be {said}, not {_given(given, steps)}."
+    if re.match("Expected `(int|float)` [<>]", what):
+        where = _entry(steps, given=given)
+        return f"{path}: {where} is {_given(given, steps)}; it must be {_limits(kind, steps)}."
     wanted = re.fullmatch(r"Expected `([^`]+)`, got `[^`]+`", what)
     if not wanted or not steps:
         where = f"{_entry(steps)}: " if steps else ""
         return f"{path}: {where}{what[:1].lower()}{what[1:]}; correct it."
     kinds = [_WANTED.get(k.strip(), k.strip()) for k in wanted[1].split("|") if k.strip() != "null"]
-    return f"{path}: {_entry(steps)} must be {' or '.join(kinds)}, not {_given(text, steps)}."
+    return f"{path}: {_entry(steps)} must be {' or '.join(kinds)}, not {_given(given, steps)}."
 
 
-def _entry(steps: Sequence[str], table: bool = False, numbered: bool = False) -> str:
+def _entry(steps: Sequence[str], table: bool = False, given: Any = None) -> str:
     """Where an entry, or a `table`, stands, as one would look for it: "[modes] count".
 
-    Tables of a list with their number, where `numbered`.
+    Tables of a list with number and name, where what is `given` in the file is known.
     """
     names = [i for i, step in enumerate(steps) if not _is_place(step)]
     said = []
     for k, i in enumerate(names):
         place = steps[i + 1] if i + 1 < len(steps) and _is_place(steps[i + 1]) else ""
         if k + 1 < len(names) or table:
-            number = f" number {int(place) + 1}" if numbered and place else ""
+            number = f" number {int(place) + 1}" if given and place else ""
+            block = _at(given, steps[: i + 2]) if number else {}
+            number += next((f" ({block[key]})" for key in NAMES if key in block), "")
             said.append(f"[[{steps[i]}]]{number}" if place else f"[{steps[i]}]")
         else:
             said.append(steps[i])
@@ -115,19 +129,32 @@ def _is_place(step: str) -> bool:
 
 def _choices(kind: Any, steps: Sequence[str]) -> list[str]:
     """What an entry may be, where that is one of few."""
-    *table, last = (step for step in steps if not _is_place(step))
-    choices = [p for p in _parts(_hints(kind, table).get(last)) if isinstance(p, str | int)]
+    choices = [part for part in _hint(kind, steps) if isinstance(part, str | int)]
     return [f'"{choice}"' if isinstance(choice, str) else str(choice) for choice in choices]
+
+
+def _limits(kind: Any, steps: Sequence[str]) -> str:
+    """What `limited` says of an entry."""
+    of = next(part for part in _hint(kind, steps) if isinstance(part, msgspec.Meta))
+    ends = (of.gt, "above"), (of.ge, "at least"), (of.lt, "below"), (of.le, "at most")
+    unit = (of.extra or {})["unit"]
+    return " and ".join(f"{word} {end:g}{unit}" for end, word in ends if end is not None)
+
+
+def _hint(kind: Any, steps: Sequence[str]) -> list[Any]:
+    """The type of an entry, and those that it is made of."""
+    *table, last = (step for step in steps if not _is_place(step))
+    return _parts(_hints(kind, table).get(last))
 
 
 def _hints(kind: Any, steps: Sequence[str]) -> dict[str, Any]:
     """Types of the entries of a table by name, as far as they are known."""
     for step in (step for step in steps if not _is_place(step)):
-        hints = typing.get_type_hints(kind) if msgspec.inspect.is_struct_type(kind) else {}
         kind = next(
-            (part for part in _parts(hints.get(step)) if msgspec.inspect.is_struct_type(part)), None
+            filter(msgspec.inspect.is_struct_type, _parts(_hints(kind, ()).get(step))), None
         )
-    return typing.get_type_hints(kind) if msgspec.inspect.is_struct_type(kind) else {}
+    known = msgspec.inspect.is_struct_type(kind)
+    return typing.get_type_hints(kind, include_extras=True) if known else {}
 
 
 def _parts(hint: Any) -> list[Any]:
@@ -135,17 +162,22 @@ def _parts(hint: Any) -> list[Any]:
     return [hint, *(inner for part in typing.get_args(hint) for inner in _parts(part))]
 
 
-def _given(text: str, steps: Sequence[str]) -> str:
+def _given(given: Any, steps: Sequence[str]) -> str:
     """The value at an entry as TOML writes it, short."""
-    value: Any = msgspec.toml.decode(text)
-    for step in steps:
-        try:
-            value = value[int(step)] if isinstance(value, list) else value[step]
-        except (LookupError, ValueError, TypeError):
-            break
+    value = _at(given, steps)
     said = {True: "true", False: "false"}.get(value) if isinstance(value, bool) else None
     said = said or (f'"{value}"' if isinstance(value, str) else str(value))
     return said if len(said) <= LONGEST else f"{said[:LONGEST]}…"
+
+
+def _at(value: Any, steps: Sequence[str]) -> Any:
+    """What steps lead to in a file's values, as far as they lead."""
+    for step in steps:
+        try:
+            value = value[int(step)] if isinstance(value, list | tuple) else value[step]
+        except (LookupError, ValueError, TypeError):
+            break
+    return value
 
 
 def _numbers(value: Any, steps: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], float]]:

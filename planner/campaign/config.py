@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -14,8 +14,9 @@ from planner.robot.config import (
     SensorTable,
     WorkspaceTable,
 )
-from planner.robot.config_file import check_sds
-from planner.toml_file import load_toml
+from planner.toml_file import limited, load_toml
+
+Minutes = Annotated[float, limited(ge=1e-3, le=1e3)]
 
 
 class ModesTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -24,9 +25,9 @@ class ModesTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `window_rate_1_s` is that of the analyser's exponential window on all channels, 0 for none.
     """
 
-    count: int = 4
+    count: Annotated[int, limited(ge=1, le=20)] = 4
     band_hz: tuple[float, float] = (4.0, 60.0)
-    window_rate_1_s: float = 0.0
+    window_rate_1_s: Annotated[float, limited(ge=0, le=1000)] = 0.0
 
 
 class AcquisitionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -40,11 +41,11 @@ class AcquisitionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     name: str = "integrated_variance"
-    candidates: int = 500
+    candidates: Annotated[int, limited(ge=10, le=20_000)] = 500
     mode_weights: list[float] | None = None
     own_poses_deg: list[list[float]] | None = None
     own_only: bool = False
-    singularity_margin: float = 0.0
+    singularity_margin: Annotated[float, limited(ge=0, le=1)] = 0.0
     hammer_height_m: tuple[float, float] | None = None
     hit_axes: Literal["all", "best"] = "all"
 
@@ -69,11 +70,11 @@ class CostTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `minutes_per_sensor` is what putting up one more sensor takes, cable and check included.
     """
 
-    speed_share: float = 0.1
-    minutes_per_pose: float = 1.0
-    minutes_per_hit: float = 0.25
-    hits_per_axis: int = 4
-    minutes_per_sensor: float = 3.0
+    speed_share: Annotated[float, limited(ge=1e-3, le=1)] = 0.1
+    minutes_per_pose: Annotated[float, limited(ge=0, le=1e3)] = 1.0
+    minutes_per_hit: Minutes = 0.25
+    hits_per_axis: Annotated[int, limited(ge=1, le=100)] = 4
+    minutes_per_sensor: Minutes = 3.0
 
 
 class FidelityTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -100,10 +101,10 @@ class SurrogateTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class StopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """When the campaign may end: frequency RMSE over the workspace (%), with a `probability`."""
 
-    frequency_sd_percent: float = 1.0
-    probability: float = 0.95
-    measurements_min: int = 3
-    measurements_max: int = 30
+    frequency_sd_percent: Annotated[float, limited(ge=1e-6, le=100)] = 1.0
+    probability: Annotated[float, limited(ge=0.5, le=0.999)] = 0.95
+    measurements_min: Annotated[int, limited(ge=0, le=1000)] = 3
+    measurements_max: Annotated[int, limited(ge=1, le=1000)] = 30
 
 
 class CutTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -113,8 +114,8 @@ class CutTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     workspace).
     """
 
-    speed_rpm: float
-    depth_m: float
+    speed_rpm: Annotated[float, limited(ge=1, le=1e6)]
+    depth_m: Annotated[float, limited(ge=1e-9, le=1)]
     file: str = "cut.toml"
     joints_deg: list[list[float]] | None = None
 
@@ -155,21 +156,8 @@ def check_config(config: CampaignConfig, path: Path) -> None:
     """InputError where entries make no sense by themselves; `path` is named there."""
     for text in _wrong(config):
         raise InputError(f"{path}: {text}")
-    for name, table in config.of_the_cell().items():
-        check_sds(table, f"{path}: [{name}]")
 
 
-# Least and largest values of numbers, by entry.
-LIMITS = {
-    "[cut] speed_rpm": (1.0, 1e6), "[cut] depth_m": (1e-9, 1.0),
-    "[cost] speed_share": (1e-3, 1.0), "[cost] minutes_per_pose": (0.0, 1e3),
-    "[cost] minutes_per_hit": (1e-3, 1e3), "[cost] hits_per_axis": (1, 100),
-    "[cost] minutes_per_sensor": (1e-3, 1e3), "[stop] probability": (0.5, 0.999),
-    "[modes] count": (1, 20), "[modes] window_rate_1_s": (0.0, 1000.0),
-    "[acquisition] candidates": (10, 20_000), "[stop] frequency_sd_percent": (1e-6, 100.0),
-    "[stop] measurements_min": (0, 1000), "[stop] measurements_max": (1, 1000),
-    "[acquisition] singularity_margin": (0.0, 1.0),
-}  # fmt: skip
 RISING = "[acquisition] hammer_height_m", "[goal] band_hz"  # ranges that are no single value
 
 
@@ -189,10 +177,6 @@ def _wrong(config: CampaignConfig) -> Iterator[str]:
     if not 0 < band[0] < band[1]:
         yield f"[modes] band_hz {list(band)} must rise from above 0 Hz."
     yield from _of_choices(config)
-    for name, (low, high) in LIMITS.items():
-        value = _value(config, name)
-        if value is not None and not low <= value <= high:
-            yield f"{name} is {value}; it must lie between {low:g} and {high:g}."
 
 
 def _of_workspace(w: WorkspaceTable) -> Iterator[str]:

@@ -131,6 +131,8 @@ def _takes(given: types.Type) -> str:
 
 
 def _word(given: types.Type) -> str:
+    if isinstance(given, types.Metadata):  # with `toml_file.limited`
+        return _word(given.type)
     if isinstance(given, types.LiteralType):
         return " or ".join(f'"{v}"' if isinstance(v, str) else str(v) for v in given.values)
     if isinstance(given, types.TupleType):

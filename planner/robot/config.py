@@ -1,18 +1,30 @@
 """robot.toml: what URDF cannot say."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
 
-from planner.robot.joint_laws import LawTable
+from planner.robot.joint_laws import LargeNumber, LawTable
+from planner.toml_file import limited
 
 BASE = "base"  # as the joint of a [[compliance]]: between floor and robot
 LONGEST_LEVER_M = 100.0
 LOSS_FACTOR_BELOW = 2.0  # of a spring: more is a damper
 SLIDE_SD_MM = 0.5  # as far as 0.05° take a tool at half a metre
 STATED_OF_SLIDE = {"stiffness": "stiffness_n_m", "damping": "damping_n_s_m"}
+
+Damper = Annotated[float, limited(ge=0, le=1e14)]
+Positive = Annotated[float, limited(gt=0)]
+Mass = Annotated[float, limited("kg", gt=0, le=1e5)]
+# Beyond a factor of 11 either way nothing is stated.
+StatedSd = Annotated[float, limited("%", gt=0, le=1000)]
+Sd = Annotated[float, limited(ge=0, le=100)]
+Length = Annotated[float, limited("m", gt=-100, lt=100)]  # in a link's frame
+Far = Annotated[float, limited(gt=-1e4, lt=1e4)]  # any place in m, any angle in degrees
+Size = Annotated[float, limited("m", gt=0, le=1e4)]
+Acceleration = Annotated[float, limited("m/s²", gt=-100, lt=100)]
 
 
 def _unstated() -> Any:
@@ -45,14 +57,14 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     joint: str
     axis: tuple[float, float, float]
-    stiffness: float = msgspec.field(default_factory=_unstated)
-    damping: float = msgspec.field(default_factory=_unstated)
-    loss_factor: float = 0.0
+    stiffness: LargeNumber = msgspec.field(default_factory=_unstated)
+    damping: Damper = msgspec.field(default_factory=_unstated)
+    loss_factor: Annotated[float, limited(ge=0, lt=LOSS_FACTOR_BELOW)] = 0.0
     tie: str = ""
     slide: bool = False
-    stiffness_sd_percent: float | None = None
-    stiffness_n_m: float | None = None
-    damping_n_s_m: float | None = None
+    stiffness_sd_percent: StatedSd | None = None
+    stiffness_n_m: LargeNumber | None = None
+    damping_n_s_m: Damper | None = None
     height_m: float = 0.0
     lever_m: float = 0.0
 
@@ -90,7 +102,7 @@ class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     link: str
     mass: float
-    com_m: tuple[float, float, float]
+    com_m: tuple[Length, Length, Length]
     inertia_kg_m2: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -101,8 +113,8 @@ class OuterHalf(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     that centre along the link's axes.
     """
 
-    mass_kg: float
-    centre_m: tuple[float, float, float]
+    mass_kg: Mass
+    centre_m: tuple[Length, Length, Length]
     inertia_kg_m2: tuple[float, float, float, float, float, float]
 
 
@@ -117,10 +129,10 @@ class LinkTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     link: str
-    mass_kg: float | None = None
-    centre_m: tuple[float, float, float] | None = None
+    mass_kg: Mass | None = None
+    centre_m: tuple[Length, Length, Length] | None = None
     inertia_kg_m2: tuple[float, float, float, float, float, float] | None = None
-    sd_percent: float | None = None
+    sd_percent: StatedSd | None = None
     guessed: bool = False
     outer_half: OuterHalf | None = None
 
@@ -134,9 +146,9 @@ class Resonator(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     joint: str
     position_m: tuple[float, float, float]
     direction: tuple[float, float, float]
-    mass: float
-    frequency_hz: float
-    damping_ratio: float
+    mass: Positive
+    frequency_hz: Positive
+    damping_ratio: Positive
 
 
 class Harmonic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -176,9 +188,9 @@ class Obstacle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A box fixed to the world: floor, table, fence."""
 
     name: str
-    center_m: tuple[float, float, float]
-    size_m: tuple[float, float, float]
-    rpy_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    center_m: tuple[Far, Far, Far]
+    size_m: tuple[Size, Size, Size]
+    rpy_deg: tuple[Far, Far, Far] = (0.0, 0.0, 0.0)
 
 
 class PointTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -193,35 +205,35 @@ class PointTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     name: str
     link: str = ""
-    position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    rpy_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    position_m: tuple[Far, Far, Far] = (0.0, 0.0, 0.0)
+    rpy_deg: tuple[Far, Far, Far] = (0.0, 0.0, 0.0)
     axes: tuple[str, ...] = ("x", "y", "z")
-    mass_kg: float = 0.0
-    node: int | None = None
+    mass_kg: Annotated[float, limited("kg", ge=0, lt=1e3)] = 0.0
+    node: Annotated[int, limited(ge=1)] | None = None
 
 
 class CollisionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Pairs of links (or link and obstacle) that may touch, and the distance to keep."""
 
     ignore: tuple[tuple[str, str], ...] = ()
-    margin_m: float = 0.0
+    margin_m: Annotated[float, limited("m", ge=0, le=1)] = 0.0
 
 
 class HitsTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How a hand hits: sds of a hit's direction and of its place beside the point."""
 
-    angle_sd_deg: float = 2.0
-    offset_sd_mm: float = 5.0
+    angle_sd_deg: Sd = 2.0
+    offset_sd_mm: Sd = 5.0
 
 
 class SensorTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What sensor and hammer are specified to, and how well the sensor's seat is known: sds."""
 
-    gain_sd_percent: float = 1.5
-    force_gain_sd_percent: float = 1.5
-    cross_axis_sd_percent: float = 3.0
-    mounting_sd_deg: float = 2.0
-    position_sd_mm: float = 10.0
+    gain_sd_percent: Sd = 1.5
+    force_gain_sd_percent: Sd = 1.5
+    cross_axis_sd_percent: Sd = 3.0
+    mounting_sd_deg: Sd = 2.0
+    position_sd_mm: Sd = 10.0
 
 
 class ReadbackTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -230,8 +242,8 @@ class ReadbackTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `joint_sd_mm` is that of joints that slide, 0.5 if left out.
     """
 
-    joint_sd_deg: float = 0.05
-    joint_sd_mm: float | msgspec.UnsetType = msgspec.UNSET
+    joint_sd_deg: Sd = 0.05
+    joint_sd_mm: Sd | msgspec.UnsetType = msgspec.UNSET
 
     @property
     def slide_sd_m(self) -> float:
@@ -246,13 +258,13 @@ class HammerTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     That is about its width at half its height. Only [[law]] asks for it.
     """
 
-    pulse_ms: float = 5.0
+    pulse_ms: Annotated[float, limited("ms", gt=0, le=100)] = 5.0
 
 
 class DiagnoseTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What a diagnosis need not explain: a mismatch of so many percent of |H| does not matter."""
 
-    matters_percent: float = 1.0
+    matters_percent: Sd = 1.0
 
     @property
     def matters(self) -> float:
@@ -273,7 +285,7 @@ class ControllerTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     signs: tuple[Literal[1, -1], ...] = ()
     offsets_deg: tuple[float, ...] = ()
     external: tuple[str, ...] = ()
-    speed_percent: float = 10.0
+    speed_percent: Annotated[float, limited("%", gt=0, le=100)] = 10.0
 
 
 class WorkspaceTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -311,12 +323,12 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     urdf: str
     tcp_frame: str
     sensor_frame: str
-    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    gravity: tuple[Acceleration, Acceleration, Acceleration] = (0.0, 0.0, -9.81)
     band_hz: tuple[float, float] = (4.0, 90.0)
     held: dict[str, float] = {}
     geometric_stiffness: bool = True
-    stiffness_sd_percent: float | None = None
-    stiffness_bias_sd_percent: float | None = None
+    stiffness_sd_percent: StatedSd | None = None
+    stiffness_bias_sd_percent: StatedSd | None = None
     compliance: tuple[Compliance, ...] = ()
     link: tuple[LinkTable, ...] = ()
     payload: tuple[Payload, ...] = ()

@@ -5,15 +5,20 @@ N·m/rad (N/m).
 """
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
+
+from planner.toml_file import limited
 
 UNKNOWN = "unknown"
 NEARLY = 1 - 1e-12
 Kind = Literal["hardening", "softening", "friction", "backlash"]
 Step = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+# A spring's stiffness, in whichever unit: up to 10⁷ times a heavy robot's.
+LargeNumber = Annotated[float, limited(gt=0, le=1e14)]
+Share = Annotated[float, limited(gt=-10, lt=10)]
 
 
 def stiffening(state: np.ndarray, before: np.ndarray, now: np.ndarray, a: np.ndarray) -> np.ndarray:
@@ -108,15 +113,15 @@ class LawTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_def
 
     joint: str
     kind: Kind
-    stiffness_n_m_rad: float | None = None
-    angle_rad: float | None = None
-    coulomb_torque_n_m: float | None = None
-    stiffness_n_m: float | None = None
-    shift_m: float | None = None
-    coulomb_force_n: float | None = None
+    stiffness_n_m_rad: LargeNumber | None = None
+    angle_rad: LargeNumber | None = None
+    coulomb_torque_n_m: LargeNumber | None = None
+    stiffness_n_m: LargeNumber | None = None
+    shift_m: LargeNumber | None = None
+    coulomb_force_n: LargeNumber | None = None
     hysteresis: Literal["dahl", "bouc_wen"] = "dahl"
-    in_spring: float = 0.0
-    in_damper_s: float = 0.0
+    in_spring: Share = 0.0
+    in_damper_s: Share = 0.0
 
     @classmethod
     def of(

@@ -62,6 +62,7 @@ def test_the_schema_tells_defaults_and_choices():
     tables = {t["name"]: t["entries"] for t in told("schema", "campaign")["tables"]}
     modes = {e["name"]: e for e in tables["[modes]"]}
     assert (modes["count"]["default"], modes["band_hz"]["takes"]) == ("4", "[number, number]")
+    assert modes["count"]["takes"] == "whole number"
     assert tables["[fidelity]"][0]["takes"] == '"frozen" or "none" or "updated"'
     assert call("schema", "log")[0] == 2
 

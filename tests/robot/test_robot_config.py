@@ -82,7 +82,7 @@ ADDED = {
         'number 8, joint_a2, "all", stiffness, 30000',
     ),
     "a payload without mass": (PAYLOAD.format(0.0, 0.1), "[[payload]], above 0 kg"),
-    "a payload in mm": (PAYLOAD.format(2.0, 150.0), "number 1, com_m, in m"),
+    "a payload in mm": (PAYLOAD.format(2.0, 150.0), "number 1, com_m, below 100 m"),
     "an impossible payload": (
         PAYLOAD.format(2.0, 0.1) + INERTIA.format(-1.0),
         "inertia, no body can have",
