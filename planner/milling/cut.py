@@ -2,13 +2,15 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
 
 from planner.errors import InputError
-from planner.toml_file import load_toml
+from planner.toml_file import limited, load_toml
+
+Percent = Annotated[float, limited(ge=0, le=100)]
 
 MOST_TEETH = 64
 MOST_POINTS = 20_000  # of speeds, or of depths
@@ -29,14 +31,14 @@ class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `kt_sd_percent` and `kr_sd_percent` say how well the coefficients are known.
     """
 
-    teeth: int
-    diameter_m: float
+    teeth: Annotated[int, limited(ge=1, le=MOST_TEETH)]
+    diameter_m: Annotated[float, limited(ge=1e-5, le=1)]
     milling: Literal["slot", "down", "up"]
-    kt_n_m2: float
-    kr_n_m2: float
+    kt_n_m2: Annotated[float, limited(ge=1e5, le=1e12)]
+    kr_n_m2: Annotated[float, limited(ge=-1e12, le=1e12)]
     spindle_rpm: tuple[float, float, int]
     depth_m: tuple[float, float, int]
-    radial_immersion: float = SLOT
+    radial_immersion: Annotated[float, limited(ge=1e-4, le=1)] = SLOT
     feed: tuple[float, float, float] = (1.0, 0.0, 0.0)
     feed_in: Literal["frf", "base", "path"] = "frf"
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
@@ -44,9 +46,9 @@ class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         "full_discretisation"
     )
     pitch_deg: list[float] | None = None
-    helix_deg: float = 0.0
-    kt_sd_percent: float = 0.0
-    kr_sd_percent: float = 0.0
+    helix_deg: Annotated[float, limited(ge=0, le=80)] = 0.0
+    kt_sd_percent: Percent = 0.0
+    kr_sd_percent: Percent = 0.0
 
     @property
     def speeds_rpm(self) -> np.ndarray:
@@ -103,17 +105,6 @@ def _unit(direction: tuple[float, float, float]) -> np.ndarray:
 
 
 def _check(cut: Cut, path: Path) -> None:
-    limits = [
-        ("teeth", cut.teeth, 1, MOST_TEETH),
-        ("diameter_m", cut.diameter_m, 1e-5, 1.0),
-        ("radial_immersion", cut.radial_immersion, 1e-4, 1.0),
-        ("kt_n_m2", cut.kt_n_m2, 1e5, 1e12),
-        ("kr_n_m2", cut.kr_n_m2, -1e12, 1e12),
-        ("helix_deg", cut.helix_deg, 0.0, 80.0),
-        ("kt_sd_percent", cut.kt_sd_percent, 0.0, 100.0),
-        ("kr_sd_percent", cut.kr_sd_percent, 0.0, 100.0),
-    ]
-    check_limits(str(path), limits)
     _check_range(cut.spindle_rpm, 1.0, 1e6, f"{path}: spindle_rpm")
     _check_range(cut.depth_m, 0.0, 1.0, f"{path}: depth_m")
     if cut.depth_m[1] <= 0:
@@ -134,15 +125,6 @@ def _check(cut: Cut, path: Path) -> None:
         raise InputError(
             f"{path}: pitch_deg needs {cut.teeth} angles above 0 that sum to 360; correct it."
         )
-
-
-def check_limits(where: str, limits: Sequence[tuple[str, float, float, float]]) -> None:
-    """InputError for the first (name, value, least, most) that lies outside."""
-    for name, value, low, high in limits:
-        if not low <= value <= high:
-            raise InputError(
-                f"{where}: {name} is {value}; it must lie between {low:g} and {high:g}."
-            )
 
 
 def check_unit(where: str, **vectors: tuple[float, float, float]) -> None:

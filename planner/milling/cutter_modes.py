@@ -8,20 +8,21 @@ would govern the fit.
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 import numpy as np
 
 from planner.errors import InputError
 from planner.frf.synthesis import pole, receptance
-from planner.milling.cut import check_limits, check_unit
+from planner.milling.cut import Percent, check_unit
 from planner.milling.cutter_frf import CutterFrf
 from planner.modal.estimate_modes import identify, inflation
 from planner.modal.fit_data import Data
 from planner.modal.rank_one_fit import Entries
 from planner.modal.residues import unpack
 from planner.modal.shape_fit import shape_fit
-from planner.toml_file import load_toml
+from planner.toml_file import limited, load_toml
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +79,13 @@ class StatedMode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `direction` is the unit vector along which it moves and is driven.
     """
 
-    frequency_hz: float
-    damping_ratio: float
-    mass_kg: float
+    frequency_hz: Annotated[float, limited(ge=1e-3, le=1e6)]
+    damping_ratio: Annotated[float, limited(ge=1e-7, le=0.999)]
+    mass_kg: Annotated[float, limited(ge=1e-9, le=1e9)]
     direction: tuple[float, float, float]
-    frequency_sd_hz: float = 0.0
-    damping_sd: float = 0.0
-    mass_sd_percent: float = 0.0
+    frequency_sd_hz: Annotated[float, limited(ge=0)] = 0.0
+    damping_sd: Annotated[float, limited(ge=0, le=1)] = 0.0
+    mass_sd_percent: Percent = 0.0
 
 
 class ModeFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -120,15 +121,10 @@ def load_mode_file(path: Path) -> ModeFile:
 
 
 def _check(mode: StatedMode, where: str) -> None:
-    limits = [
-        ("frequency_hz", mode.frequency_hz, 1e-3, 1e6),
-        ("damping_ratio", mode.damping_ratio, 1e-7, 0.999),
-        ("mass_kg", mode.mass_kg, 1e-9, 1e9),
-        ("frequency_sd_hz", mode.frequency_sd_hz, 0.0, mode.frequency_hz),
-        ("damping_sd", mode.damping_sd, 0.0, 1.0),
-        ("mass_sd_percent", mode.mass_sd_percent, 0.0, 100.0),
-    ]
-    check_limits(where, limits)
+    if mode.frequency_sd_hz > mode.frequency_hz:
+        raise InputError(
+            f"{where}: frequency_sd_hz is more than frequency_hz; correct one of them."
+        )
     check_unit(where, direction=mode.direction)
 
 
