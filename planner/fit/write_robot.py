@@ -146,21 +146,19 @@ def write_robot(
     out, bodies = out.absolute(), result.simulation.elastic.bodies
     change = result.simulation.elastic.inertia - ElasticModel(robot).inertia
     elsewhere = out.parent.resolve() != robot.path.parent.resolve()
-    urdf, name, moved = robot.urdf_path, None, None
+    urdf, name, payload, unchanged = robot.urdf_path, None, robot.config.payload, ()
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         if elsewhere or np.any(change):
             name = robot.urdf_path.name if elsewhere else f"{out.stem}.urdf"
             urdf = out.parent / name
-            moved = with_inertias(robot, bodies, change)
-            _write_new(urdf, moved.urdf)
+            text, payload, unchanged = with_inertias(robot, bodies, change)
+            _write_new(urdf, text)
             if elsewhere:
-                copy_meshes(moved.urdf, robot.urdf_path, urdf)
+                copy_meshes(text, robot.urdf_path, urdf)
         stated = robot.path.read_text(encoding="utf-8-sig")
         inside = sum(len(e.compliance) for e in robot.config.effects)
         added = robot.config.compliance[len(tomlkit.parse(stated)["compliance"]) + inside :]
-        payload = robot.config.payload if moved is None else moved.payload
-        unchanged = () if moved is None else moved.unchanged
         halves = outer_halves(robot, result.simulation.elastic, unchanged)
         _write_new(out, updated_toml(stated, result, name, added, laws, payload, halves))
     except OSError as error:

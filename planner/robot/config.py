@@ -349,14 +349,10 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 LISTS = "compliance", "payload", "resonator", "harmonic"  # that effects add to
 
-Order = Sequence[tuple[int, int]]
-STATED: Order = (0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)  # robot.toml, as in a URDF
-PINOCCHIO: Order = (0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)
+STATED = (0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)  # order of moments, as in a URDF
 
 
-def symmetric(values: Sequence[float] | np.ndarray, order: Order) -> np.ndarray:
-    """(3, 3) of its six numbers in some order."""
-    found = np.zeros((3, 3))
-    for (i, j), value in zip(order, values, strict=True):
-        found[i, j] = found[j, i] = value
-    return found
+def symmetric(values: Sequence[float]) -> np.ndarray:
+    """(3, 3) of its six numbers in the order of STATED."""
+    xx, xy, xz, yy, yz, zz = values
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

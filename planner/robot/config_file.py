@@ -13,7 +13,6 @@ from planner.recording.points import AXES
 from planner.robot.config import (
     BASE,
     LISTS,
-    STATED,
     Compliance,
     ControllerTable,
     OuterHalf,
@@ -124,7 +123,7 @@ def _check_payloads(config: RobotConfig, path: Path) -> None:
         entry = f"{path}: [[payload]] number {number} ({block.link})"
         if not 0 < block.mass <= 1e5:  # in [[effects]] it may be below
             raise InputError(f"{entry} has mass {block.mass}; give one above 0 kg, at most 1e5 kg.")
-        moments = symmetric(block.inertia_kg_m2, STATED)
+        moments = symmetric(block.inertia_kg_m2)
         finite = bool(np.all(np.isfinite(moments)))
         if not finite or np.linalg.eigvalsh(moments)[0] < -1e-9 * np.abs(moments).max():
             raise _no_body(entry, block.inertia_kg_m2)
@@ -149,7 +148,7 @@ def _check_links(config: RobotConfig, path: Path) -> None:
 
 
 def _check_body(entry: str, body: OuterHalf) -> None:
-    moments = np.linalg.eigvalsh(symmetric(body.inertia_kg_m2, STATED))
+    moments = np.linalg.eigvalsh(symmetric(body.inertia_kg_m2))
     if moments[0] < 0 or moments[0] + moments[1] < moments[2] * (1 - 1e-6):
         raise _no_body(entry, body.inertia_kg_m2)
 

@@ -76,7 +76,7 @@ def link_inertia(link: ElementTree.Element) -> pin.Inertia:
         return pin.Inertia.Zero()
     mass, entries = inertial.find("mass"), inertial.find("inertia")
     stated = {} if entries is None else entries.attrib
-    moments = symmetric([float(stated.get(k, "0")) for k in ENTRIES], STATED)
+    moments = symmetric([float(stated.get(k, "0")) for k in ENTRIES])
     place = place_of(inertial)
     turned = place.rotation @ moments @ place.rotation.T
     value = 0.0 if mass is None else float(mass.get("value", "0"))
@@ -100,10 +100,14 @@ def write_inertia(link: ElementTree.Element, inertia: pin.Inertia) -> None:
         ElementTree.SubElement(inertial, name, attributes).tail = tail
 
 
+def stated_inertia(mass: float, centre: Sequence[float], moments: Sequence[float]) -> pin.Inertia:
+    """Of a body, in its link's frame, as robot.toml states it in kg, m and kg·m²."""
+    return pin.Inertia(mass, np.array(centre, dtype=float), symmetric(moments))
+
+
 def state_inertias(links: Links, tables: Sequence[LinkTable]) -> None:
     """Put what [[link]] of robot.toml states before the links' own <inertial>."""
     for table in tables:
         if table.mass_kg is not None and table.link in links:
-            moments = symmetric(table.inertia_kg_m2 or (0.0,) * 6, STATED)
-            centre = np.array(table.centre_m or (0.0,) * 3)
-            write_inertia(links[table.link], pin.Inertia(table.mass_kg, centre, moments))
+            centre, moments = table.centre_m or (0.0,) * 3, table.inertia_kg_m2 or (0.0,) * 6
+            write_inertia(links[table.link], stated_inertia(table.mass_kg, centre, moments))

@@ -2,7 +2,6 @@
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -36,17 +35,10 @@ def _upper(matrix: np.ndarray) -> np.ndarray:
     return np.linalg.cholesky(matrix[::-1, ::-1])[::-1, ::-1]
 
 
-@dataclass(frozen=True)
-class ChangedInertias:
-    """Text of a URDF and its robot's payloads after a change, and bodies that could not have it."""
-
-    urdf: str
-    payload: tuple[Payload, ...]
-    unchanged: tuple[str, ...]
-
-
-def with_inertias(robot: Robot, bodies: tuple[str, ...], change: np.ndarray) -> ChangedInertias:
-    """Links and payloads after change (B, 10) of the bodies' inertias, which `bodies` names.
+def with_inertias(
+    robot: Robot, bodies: tuple[str, ...], change: np.ndarray
+) -> tuple[str, tuple[Payload, ...], tuple[str, ...]]:
+    """Text of the URDF and payloads after change (B, 10) of `bodies`, and which could not have it.
 
     What [[link]] of robot.toml states is in the URDF (a robot.toml beside it must not state them).
     Bodies, their frames and the ten numbers are those of `ElasticModel.inertia`. All that makes up
@@ -77,7 +69,7 @@ def with_inertias(robot: Robot, bodies: tuple[str, ...], change: np.ndarray) -> 
                 own = _moved(payload_inertia(block), placed[block.link], to)
                 payload[number] = _as_payload(block.link, own)
     text = text[: text.index("<robot")] + ElementTree.tostring(root, encoding="unicode")
-    return ChangedInertias(text, tuple(payload), tuple(unchanged))
+    return text, tuple(payload), tuple(unchanged)
 
 
 def _whole(robot: Robot, bodies: tuple[str, ...], change: np.ndarray) -> dict[str, np.ndarray]:
@@ -96,9 +88,7 @@ def _moved(inertia: pin.Inertia, placement: pin.SE3, to: np.ndarray) -> pin.Iner
     there = placement.homogeneous
     own = np.linalg.inv(there) @ to @ there
     spread = own @ _spread(inertia.toDynamicParameters()) @ own.T
-    return pin.Inertia.FromDynamicParameters(
-        pin.PseudoInertia.FromMatrix(spread).toDynamicParameters()
-    )
+    return pin.PseudoInertia.FromMatrix(spread).toInertia()
 
 
 def outer_halves(

@@ -8,8 +8,9 @@ import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
-from planner.robot.config import BASE, PINOCCHIO, STATED, Payload, symmetric
+from planner.robot.config import BASE, Payload
 from planner.robot.robot import PREFIX, Robot
+from planner.robot.urdf_elements import stated_inertia
 
 SMALL = "resonator"  # and its number: a body of its own too
 BETWEEN = 0.75  # share of a rod's second moment that its halves' centres have
@@ -169,19 +170,17 @@ def _stated_halves(
 
     Raises InputError where nothing that a body can have would be left for the inner one.
     """
-    stated = (table.outer_half for table in robot.config.link if table.link == link)
-    half = next(stated, None)
+    half = next((table.outer_half for table in robot.config.link if table.link == link), None)
     if half is None:
         return None
-    moments = symmetric(half.inertia_kg_m2, STATED)
-    centre = np.array(half.centre_m)
-    inner = whole - pin.Inertia(half.mass_kg, centre, moments).toDynamicParameters()
+    stated = stated_inertia(half.mass_kg, half.centre_m, half.inertia_kg_m2)
+    inner = whole - stated.toDynamicParameters()
     if np.linalg.eigvalsh(pin.PseudoInertia.FromDynamicParameters(inner).toMatrix())[0] <= 0:
         raise InputError(
             f"{robot.path}: [[link]] {link} has an outer_half that leaves no possible body of the "
             f"{whole[0]:.4g} kg of the whole link for the inner half; correct it or leave it out."
         )
-    outer = pin.Inertia(half.mass_kg, centre - cut, moments)
+    outer = pin.SE3(np.eye(3), -cut).act(stated)
     return inner, np.array(outer.toDynamicParameters())
 
 
@@ -276,13 +275,12 @@ def _add_joint(
 def _body(values: np.ndarray) -> pin.Inertia:
     if values[0] != 0:
         return pin.Inertia.FromDynamicParameters(values)
-    return pin.Inertia(0.0, np.zeros(3), symmetric(values[4:], PINOCCHIO))
+    return pin.Inertia(0.0, np.zeros(3), pin.Symmetric3(values[4:]).matrix())
 
 
 def payload_inertia(block: Payload) -> pin.Inertia:
     """Of a payload in its link's frame."""
-    moments = symmetric(block.inertia_kg_m2, STATED)
-    return pin.Inertia(block.mass, np.array(block.com_m, dtype=float), moments)
+    return stated_inertia(block.mass, block.com_m, block.inertia_kg_m2)
 
 
 def body_inertia(robot: Robot, joint: int) -> np.ndarray:
@@ -299,16 +297,12 @@ def body_inertia(robot: Robot, joint: int) -> np.ndarray:
 def inertia_basis() -> np.ndarray:
     """(10, 6, 6): the spatial inertia of a body is their sum weighted by its parameters.
 
-    Linear velocities first (Featherstone 2008, eq. 2.63, with its halves swapped).
+    Linear velocities first.
     """
-    basis = np.zeros((10, 6, 6))
-    basis[0, :3, :3] = np.eye(3)
-    for axis in range(3):
-        cross = np.cross(np.eye(3)[axis], np.eye(3)).T  # column k is e_axis × e_k
-        basis[1 + axis, :3, 3:] = -cross
-        basis[1 + axis, 3:, :3] = cross
-    for number, (i, j) in enumerate(PINOCCHIO, 4):
-        basis[number, 3 + i, 3 + j] = basis[number, 3 + j, 3 + i] = 1.0
+    # Of each parameter beside a mass of 1: Pinocchio takes no centre or moments without a mass.
+    rows = np.eye(10) + np.eye(10)[0] * (np.arange(10) > 0)[:, None]
+    basis = np.array([pin.Inertia.FromDynamicParameters(row).matrix() for row in rows])
+    basis[1:] -= basis[0]
     basis.flags.writeable = False
     return basis
 
