@@ -113,7 +113,7 @@ def _entry(steps: Sequence[str], table: bool = False, given: Any = None) -> str:
     for k, i in enumerate(names):
         place = steps[i + 1] if i + 1 < len(steps) and _is_place(steps[i + 1]) else ""
         if k + 1 < len(names) or table:
-            number = f" number {int(place) + 1}" if given and place else ""
+            number = f" number {int(place) + 1}" if given and place.isdecimal() else ""
             block = _at(given, steps[: i + 2]) if number else {}
             number += next((f" ({block[key]})" for key in NAMES if key in block), "")
             said.append(f"[[{steps[i]}]]{number}" if place else f"[{steps[i]}]")

@@ -38,7 +38,7 @@ from planner.modal.shape_fit import shape_fit
 from planner.recording.joints import JointUnits
 from planner.recording.read import read_frfs
 from planner.recording.records import AXES, FrfRecord
-from planner.toml_file import load_toml
+from planner.toml_file import limited, load_toml
 
 # How far behind: rotations of rotations are second differences. With 1 % noise, of twenty machines
 # 20 mm left two 8 and 12 % off at a peak, where 30 mm left none beyond 5 %.
@@ -150,11 +150,11 @@ Four = Annotated[tuple[Pair, ...], msgspec.Meta(min_length=4, max_length=4)]
 class TipModeTable(msgspec.Struct, forbid_unknown_fields=True):
     """[[mode]] of a file with modes of two points."""
 
-    frequency_hz: float
-    damping_ratio: float
+    frequency_hz: Annotated[float, limited("Hz", gt=0)]
+    damping_ratio: Annotated[float, limited(gt=0, lt=1)]
     right: Four
     left: Four
-    from_tip_m: float
+    from_tip_m: Annotated[float, limited("m", gt=0)]
 
 
 class TipModesTable(msgspec.Struct, forbid_unknown_fields=True):
@@ -171,12 +171,6 @@ def _modes(path: Path, noise: float) -> TipReceptance:
     if not (0 < low < high and 2 <= count <= 200_000):
         raise InputError(f"{path}: lines_hz has to be [from above 0, to, how many]; correct it.")
     frequency = np.linspace(low, high, count)
-    for number, mode in enumerate(table.mode, 1):
-        if not (mode.frequency_hz > 0 and 0 < mode.damping_ratio < 1 and mode.from_tip_m > 0):
-            raise InputError(
-                f"{path}, mode {number}: frequency_hz and from_tip_m have to be above zero and "
-                f"damping_ratio between 0 and 1; correct it."
-            )
     stated = [(m.frequency_hz, m.damping_ratio) for m in table.mode]
     hertz, damping = np.reshape(stated, (-1, 2)).T
     poles = synthesis.pole(hertz, damping)
