@@ -93,8 +93,10 @@ def wrong_entry(path: Path | str, name: str, given: Any, kind: type, fault: str)
         said = f"{', '.join(choices[:-1])} or {choices[-1]}"
         return f"{path}: {_entry(steps)} must be {said}, not {_given(given, steps)}."
     if re.match("Expected `(int|float)` [<>]", what):
-        where = _entry(steps, given=given)
-        return f"{path}: {where} is {_given(given, steps)}; it must be {_limits(kind, steps)}."
+        where, value = _entry(steps, given=given), _given(given, steps)
+        endless = value.lstrip("-") in ("nan", "inf")
+        must = "a finite number" if endless else _limits(kind, steps)
+        return f"{path}: {where} is {value}; it must be {must}."
     wanted = re.fullmatch(r"Expected `([^`]+)`, got `[^`]+`", what)
     if not wanted or not steps:
         where = f"{_entry(steps)}: " if steps else ""

@@ -15,7 +15,6 @@ LOSS_FACTOR_BELOW = 2.0  # of a spring: more is a damper
 SLIDE_SD_MM = 0.5  # as far as 0.05° take a tool at half a metre
 STATED_OF_SLIDE = {"stiffness": "stiffness_n_m", "damping": "damping_n_s_m"}
 
-Damper = Annotated[float, limited(ge=0, le=1e14)]
 Positive = Annotated[float, limited(gt=0)]
 Mass = Annotated[float, limited("kg", gt=0, le=1e5)]
 # Beyond a factor of 11 either way nothing is stated.
@@ -58,13 +57,13 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     joint: str
     axis: tuple[float, float, float]
     stiffness: LargeNumber = msgspec.field(default_factory=_unstated)
-    damping: Damper = msgspec.field(default_factory=_unstated)
+    damping: Annotated[float, limited(ge=0, le=1e14)] = msgspec.field(default_factory=_unstated)
     loss_factor: Annotated[float, limited(ge=0, lt=LOSS_FACTOR_BELOW)] = 0.0
     tie: str = ""
     slide: bool = False
     stiffness_sd_percent: StatedSd | None = None
-    stiffness_n_m: LargeNumber | None = None
-    damping_n_s_m: Damper | None = None
+    stiffness_n_m: Annotated[float, limited("N/m", gt=0, le=1e14)] | None = None
+    damping_n_s_m: Annotated[float, limited("N·s/m", ge=0, le=1e14)] | None = None
     height_m: float = 0.0
     lever_m: float = 0.0
 

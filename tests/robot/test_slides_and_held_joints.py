@@ -175,7 +175,7 @@ def test_tables_need_millimetres_of_what_slides(tmp_path):
 WRONG = {
     "a rail's spring in N·m/rad": ("_n_m", "", r"rail slides.*stiffness_n_m \(N/m\)"),
     "both units": ("stiffness_n_m", "stiffness = 1.0\nstiffness_n_m", "not both"),
-    "one of two": ("damping_n_s_m", "loss_factor", "damping_n_s_m"),
+    "one of two": ("damping_n_s_m = ", "loss_factor = 0.1 # ", "damping_n_s_m"),
     "negative": ("stiffness_n_m = ", "stiffness_n_m = -", "above 0 N/m"),
 }
 
