@@ -6,15 +6,13 @@ In the name of its column, or as attributes of entries: "unit_string", "y_values
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from planner.errors import InputError
 from planner.recording.records import AXES
-from planner.recording.sampling import UNEVEN
+from planner.recording.sampling import Axis, common_step
 
 
 class Unit(NamedTuple):
@@ -175,28 +173,17 @@ _NAMES = {"name", "channelname", "signalname", "label", "title", "names", "chann
 _UNITS = {"unit", "units", "unitstring", "unitlabel", "yunit", "yunits", "yunitlabel",
           "niunitdescription", "engineeringunits", "engunits", "quantitylabel",
           "unitsymbol"}  # fmt: skip
-RATES = {"fs", "fshz", "samplerate", "sampleratehz", "samplingrate", "samplingratehz",
-          "samplefrequency", "samplingfrequency", "samplingfrequencyhz", "fsample", "rate",
-          "abtastrate", "abtastfrequenz"}  # fmt: skip
-STEPS = {"dt", "dts", "deltat", "deltax", "timestep", "increment", "xincrement", "xinc",
-          "wfincrement", "timeincrement", "samplinginterval", "sampleinterval", "samplingperiod",
-          "sampleperiod", "abtastintervall"}  # fmt: skip
-_STARTS = {"start", "starts", "starttime", "startvalue", "startoffset", "t0", "tstart", "x0",
-           "xstart", "timestart", "wfstarttime", "wfstartoffset"}  # fmt: skip
+_RATES = {"fs", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "fsample",
+          "rate", "abtastrate", "abtastfrequenz"}  # fmt: skip
+_STEPS = {"dt", "deltat", "deltax", "timestep", "increment", "xincrement", "xinc", "wfincrement",
+          "timeincrement", "samplinginterval", "sampleinterval", "samplingperiod", "sampleperiod",
+          "abtastintervall"}  # fmt: skip
+_STARTS = {"start", "starttime", "startvalue", "startoffset", "t0", "tstart", "x0", "xstart",
+           "timestart", "wfstarttime", "wfstartoffset"}  # fmt: skip
 _ABSCISSA = re.compile(r"x|x.?(values?|axis|data)|abscissa|time.?(axis|base)")
 _X_UNITS = {"xunit", "xunits", "xunitlabel", "wfxunitstring", "wfxunit"}
 # Zero of LabVIEW's clock: what states it states no time.
 _FIRST_DATE = np.datetime64("1904-01-03")
-
-
-@dataclass(frozen=True)
-class Axis:
-    """What the samples of a channel stand at: `step` and `offset` in s, or in Hz of a spectrum."""
-
-    quantity: str  # "time" or "frequency"
-    step: float | None
-    offset: float | None  # of the first sample, from `date_s` where that is stated
-    date_s: float | None  # since 1970
 
 
 def name_of(attributes: Attributes) -> str:
@@ -240,31 +227,28 @@ def rescaled(attributes: Attributes) -> str:
 
 def axis_of(path: Path, attributes: Attributes) -> Axis:
     """What samples stand at. Raises InputError where it is stated twice and differently."""
-    steps = [n for _, v in _of_keys(attributes, STEPS) if (n := number(v)) is not None and n]
-    rates = [n for _, v in _of_keys(attributes, RATES) if (n := number(v)) is not None and n]
     on_axis = (
         lookup(value) for key, value in attributes.items()
         if isinstance(value, str) and (_on_abscissa(key) or set(_forms(key)) & _X_UNITS)
     )  # fmt: skip
     units = (unit for unit in on_axis if unit and unit.quantity in _AXES)
     quantity, _, factor = next(units, _AXES["time"][0])
-    found = [1 / rate for rate in rates] + [step * factor for step in steps]
-    for step in found[1:]:
-        if not abs(step - found[0]) <= UNEVEN * abs(found[0]):
-            raise InputError(
-                f"{path} states sampling steps of {found[0]:.6g} and {step:.6g} s for one channel; "
-                f"correct the one that is wrong."
-            )
+    rates, steps, starts = (
+        {key: n for key, v in _of_keys(attributes, keys)
+         if (n := number(v, unit_text(key))) is not None}
+        for keys in (_RATES, _STEPS, _STARTS)
+    )  # fmt: skip
+    stated = {key: 1 / rate for key, rate in rates.items() if rate}
+    stated |= {key: step * factor for key, step in steps.items() if step}
     # Offset and date of the first sample, as LabVIEW means them, add up.
-    values = [value for _, value in _of_keys(attributes, _STARTS)]
-    dates = (date for value in values if (date := _date(value)) is not None)
-    offset = next((n * factor for value in values if (n := number(value)) is not None), None)
-    return Axis(quantity, found[0] if found else None, offset, next(dates, None))
+    offset = next((start * factor for start in starts.values()), None)
+    dates = (date for _, v in _of_keys(attributes, _STARTS) if (date := _date(v)) is not None)
+    return Axis(quantity, common_step(path, stated), offset, next(dates, None))
 
 
 def is_axis(key: str) -> bool:
     """Whether an attribute is of one channel's axis, unit or name, and of no record."""
-    known = STEPS | RATES | _STARTS | _UNITS | _NAMES | _X_UNITS
+    known = _STEPS | _RATES | _STARTS | _UNITS | _NAMES | _X_UNITS
     return any(form in known for form in _forms(key))
 
 
@@ -282,13 +266,14 @@ def _date(value: object) -> float | None:
 
 def number(value: object, unit: str = "") -> float | None:
     """A number, or a text of one with its unit ("51.2 kHz", "0.1 ms") or in `unit`, in SI."""
-    if isinstance(value, int | float):
-        return float(value)
     found = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([a-zA-Zµμ]*)\s*", str(value))
+    known = lookup((found and found[2]) or unit)
+    factor = known.factor if known else 1.0
+    if isinstance(value, int | float):
+        return float(value) * factor
     if not found or found[1].count(".") > 1 or found[1].strip("+-.") == "":
         return None
-    known = lookup(found[2] or unit)
-    return float(found[1]) * (known.factor if known else 1.0)
+    return float(found[1]) * factor
 
 
 def _of_keys(attributes: Attributes, keys: set[str]) -> Iterator[tuple[str, object]]:
@@ -309,6 +294,6 @@ def _on_abscissa(key: str) -> bool:
 
 
 def _forms(key: str) -> tuple[str, ...]:
-    """Letters and digits of a key: of its last level, and of its last two."""
-    levels = [re.sub(r"[^a-z0-9]", "", level) for level in key.lower().split(".")]
+    """Letters and digits of a key without its unit: of its last level, and of its last two."""
+    levels = [re.sub(r"[^a-z0-9]", "", level) for level in bare(key).split(".")]
     return levels[-1], "".join(levels[-2:])

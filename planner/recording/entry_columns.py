@@ -9,7 +9,6 @@ import numpy as np
 from planner.errors import InputError
 from planner.recording.column_names import (
     Attributes,
-    Axis,
     Unit,
     axis_of,
     axis_unit,
@@ -25,7 +24,7 @@ from planner.recording.column_names import (
 )
 from planner.recording.named_columns import Named, holds_frfs
 from planner.recording.records import check_numbers
-from planner.recording.sampling import UNEVEN, sampling_rate
+from planner.recording.sampling import common_step, sampling_rate
 
 # A small file may unfold to any size: a hit of 5 channels at 100 kHz over 60 s is 240 MB.
 LARGEST_BYTES = 384 * 1024 * 1024
@@ -282,7 +281,6 @@ def named_from(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> Na
     """
     names = _names(file, columns, by_place)
     axes = {n: axis_of(file, c.stated) for n, c in zip(names, columns, strict=True)}
-    attributes = _attributes(columns)
     for column in columns:
         if said := rescaled(column.stated):
             raise InputError(
@@ -290,44 +288,18 @@ def named_from(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> Na
                 f"it, so nothing says what its numbers are in; export it in N or m/s^2."
             )
     held = {n: c.values for n, c in zip(names, columns, strict=True)}
-    starts, first = _starts(file, axes)
-    if len({len(c.values) for c in columns}) > 1 and len(starts) < len(columns):
-        starts = {}  # what states no start cannot be laid beside the others
-    if step := _common_step(file, {n: a.step for n, a in axes.items() if a.step}):
-        if any(axis.quantity == "frequency" for axis in axes.values()):
-            lines = np.arange(max(len(values) for values in held.values())) * step + first
-            held, starts = {"frequency_hz": lines, **held}, {}
-            if not holds_frfs(Named(held, {})):
-                raise InputError(
-                    f"{file} holds spectra ({', '.join(names[:3])}, … over Hz) and no FRFs; export "
-                    f"time histories, or FRFs with real and imaginary part."
-                )
-        else:
-            attributes["sampling_rate_hz"] = repr(1 / step)
     units = {n: c.unit for n, c in zip(names, columns, strict=True) if c.unit}
-    return Named(held, units, attributes, start_s=starts)
-
-
-def _starts(file: Path, axes: Mapping[str, Axis]) -> tuple[dict[str, float], float]:
-    """When columns begin, in s after the first that says so, and the first's own offset.
-
-    A channel without a date begins with the others, if those begin together.
-    """
-    dates = {n: a.date_s for n, a in axes.items() if a.date_s is not None}
-    first_date = min(dates.values(), default=0.0)
-    undated = [n for n, a in axes.items() if n not in dates and a.step]
-    if undated and max(dates.values(), default=0.0) > first_date:
-        raise InputError(
-            f"{file}: {next(iter(dates))} and others say when they begin, {undated[0]} does not; "
-            f"export what was sampled together."
-        )
-    known = {
-        n: dates.get(n, first_date) - first_date + (a.offset or 0.0)
-        for n, a in axes.items()
-        if a.offset is not None or n in dates
-    }
-    first = min(known.values(), default=0.0)
-    return {n: start - first for n, start in known.items()}, first
+    steps = {n: axis.step for n, axis in axes.items() if axis.step}
+    if steps and any(axis.quantity == "frequency" for axis in axes.values()):
+        first = min((a.offset for a in axes.values() if a.offset is not None), default=0.0)
+        lines = np.arange(max(map(len, held.values()))) * common_step(file, steps) + first
+        held = {"frequency_hz": lines, **held}
+        if not holds_frfs(Named(held)):
+            raise InputError(
+                f"{file} holds spectra ({', '.join(names[:3])}, … over Hz) and no FRFs; export "
+                f"time histories, or FRFs with real and imaginary part."
+            )
+    return Named(held, units, _attributes(columns), sampled=axes)
 
 
 def _names(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> list[str]:
@@ -367,18 +339,6 @@ def _differing(
     stem = path[: len(path) + 1 - depth]
     alone = sum(c.path[: len(stem)] == stem for c in columns) == 1
     return stem[-1] if stem and alone else " ".join(path[-depth:])
-
-
-def _common_step(file: Path, steps: Mapping[str, float]) -> float | None:
-    """The step that all which state one have; InputError where they contradict."""
-    first, common = next(iter(steps.items()), ("", None))
-    for name, step in steps.items():
-        if not abs(step - steps[first]) <= UNEVEN * abs(steps[first]):
-            raise InputError(
-                f"{file}: channels {first} and {name} have different rates; export channels that "
-                f"were sampled together."
-            )
-    return common
 
 
 def _attributes(columns: Sequence[EntryColumn]) -> dict[str, str]:

@@ -18,20 +18,18 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.recording.column_names import (
-    RATES,
-    STEPS,
     Unit,
+    axis_of,
     axis_unit,
     bare,
     direction_in,
     hit_direction,
     lookup,
     lookup_ratio,
-    number,
     unit_text,
 )
 from planner.recording.records import Channel, End, FrfRecord, Record, TimeRecord, check_numbers
-from planner.recording.sampling import UNEVEN, aligned, sampling_rate
+from planner.recording.sampling import Axis, aligned, common_step, sampling_rate
 
 _AT = re.compile(r"acceleration_(.+)_[xyz]$")
 
@@ -40,14 +38,14 @@ _AT = re.compile(r"acceleration_(.+)_[xyz]$")
 class Named:
     """Columns by name, with units where stated, and attributes of the file.
 
-    `start_s` says when a column begins (s), where the file does.
+    `sampled` is what the file states of single columns' samples.
     """
 
     columns: Mapping[str, np.ndarray]
     units: Mapping[str, str] = field(default_factory=dict)
     attributes: Mapping[str, str] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
-    start_s: Mapping[str, float] = field(default_factory=dict)
+    sampled: Mapping[str, Axis] = field(default_factory=dict)
 
     def attribute(self, *names: str) -> str | None:
         """The first attribute of these names; letters alone count."""
@@ -90,52 +88,33 @@ def to_records(path: Path, named: Named) -> tuple[Record, ...]:
 
 
 def _time(path: Path, named: Named) -> TimeRecord:
-    times = {n: u for n in named.columns if (u := named.axis(n, "time"))}
-    start_s = dict(named.start_s)
-    rates = _stated_rates(path, named)
-    current = next(iter(times), None)
-    for name, values in named.columns.items():
-        if name in times:
-            current = name
-            rates[name] = sampling_rate(path, np.real(values) * times[name].factor)
-        if current is not None and len(times) > 1:
-            first = float(np.real(named.columns[current][0])) * times[current].factor
-            start_s.setdefault(name, first)
-    if not rates:
+    times = {n: np.real(v) * unit.factor for n, v in named.columns.items()
+             if (unit := named.axis(n, "time"))}  # fmt: skip
+    steps = {name: 1 / sampling_rate(path, at) for name, at in times.items()}
+    steps |= {n: axis.step for n, axis in named.sampled.items() if axis.step and n not in times}
+    if of_all := axis_of(path, named.attributes).step:
+        steps["its header"] = of_all
+    step = common_step(path, steps)
+    if step is None:
         names = ", ".join(list(named.columns)[:6])
         raise InputError(
             f"{path} has neither a column time_s nor a sampling_rate_hz, nor FRFs over a column "
             f"frequency_hz; it has {names}: export one of them, with its name."
         )
-    rate_hz = rates[min(rates, key=lambda name: name not in times)]
-    for name, rate in rates.items():
-        if not abs(rate / rate_hz - 1) < UNEVEN:
-            first = "its time column one of" if times else "and also"
-            raise InputError(
-                f"{path} states a sampling rate of {rate:.6g} Hz ({name}), {first} "
-                f"{rate_hz:.6g} Hz; correct the one that is wrong."
-            )
-    channels = [_channel(name, v, named) for name, v in named.columns.items() if name not in times]
+    channels, axes, current = [], [], next(iter(times), "")
+    for name, values in named.columns.items():
+        if name in times:
+            current = name
+            continue
+        channels.append(_channel(name, values, named))
+        # Of several columns of times each is of those that follow it.
+        start = float(times[current][0]) if len(times) > 1 else None
+        axes.append(named.sampled.get(name, Axis(offset=start)))
     if not channels:
         raise InputError(f"{path} holds times and nothing else; export force and accelerations.")
-    begin = [start_s.get(channel.name, 0.0) for channel in channels]
-    common, remarks = aligned(path, channels, begin, rate_hz)
+    rate_hz = float(f"{1 / step:.12g}")  # quotients round the last digits
+    common, remarks = aligned(path, channels, axes, rate_hz)
     return TimeRecord(path, rate_hz, common, (*named.remarks, *remarks), named.simulated)
-
-
-def _stated_rates(path: Path, named: Named) -> dict[str, float]:
-    """Rates in Hz that attributes state, by their names."""
-    found = {}
-    for key, text in named.attributes.items():
-        name = _letters(bare(key))
-        if name in RATES or name in STEPS:
-            value = number(str(text), unit_text(key)) or 0.0
-            if not 1e-9 < value < 1e9:
-                raise InputError(
-                    f"{path}: {key} {text} is no rate in Hz nor step in s; correct it."
-                )
-            found[key] = value if name in RATES else 1 / value
-    return found
 
 
 def _channel(name: str, values: np.ndarray, named: Named) -> Channel:

@@ -1,8 +1,8 @@
 """When channels and hits were sampled: rates, and channels that do not begin together."""
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,31 @@ SLOWEST_S = 1e6  # between two samples
 # hundred samples better than that; rates that analysers offer lie a percent or more apart. Chosen.
 ALIKE = 1e-4
 SHORT = 0.6  # of the others' length, below which a record was cut off. Chosen.
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What is stated of where a channel's samples stand: `step` and `offset` in s, or in Hz.
+
+    `offset` is that of the first sample, from `date_s` (since 1970) where that is stated.
+    """
+
+    quantity: str = "time"  # or "frequency", of a spectrum
+    step: float | None = None
+    offset: float | None = None
+    date_s: float | None = None
+
+
+def common_step(path: Path, steps: Mapping[str, float]) -> float | None:
+    """The step that all which state one (by their names) have; InputError where they contradict."""
+    first, common = next(iter(steps.items()), ("", None))
+    for name, step in steps.items():
+        if not abs(step - steps[first]) <= UNEVEN * abs(steps[first]):
+            raise InputError(
+                f"{path}: {first} and {name} have different rates (steps of {common:.6g} and "
+                f"{step:.6g} s); correct what is wrong, or export what was sampled together."
+            )
+    return common
 
 
 def sampling_rate(path: Path, time_s: np.ndarray) -> float:
@@ -68,14 +93,14 @@ def _first_whole(values: np.ndarray, magnitude: np.ndarray) -> np.ndarray:
 
 
 def aligned(
-    path: Path, channels: Sequence[Channel], start_s: Sequence[float], rate_hz: float
+    path: Path, channels: Sequence[Channel], axes: Sequence[Axis], rate_hz: float
 ) -> tuple[tuple[Channel, ...], tuple[str, ...]]:
     """Channels over the time that all of them have, and what was left out, in words.
 
-    `start_s` (one a channel) says when each begins. Raises InputError where channels that begin
+    `axes` (one a channel) say when each begins. Raises InputError where channels that begin
     together differ in length, and where they have no time in common.
     """
-    begin = np.asarray(start_s, dtype=float)
+    begin = _begin_s(path, channels, axes)
     lengths = np.array([len(channel.samples) for channel in channels])
     late = np.max(begin) - begin
     if np.all(late < 0.01 / rate_hz):
@@ -101,6 +126,31 @@ def aligned(
         for channel, at in zip(channels, skip, strict=True)
     )
     return tuple(cut), tuple(remarks)
+
+
+def _begin_s(path: Path, channels: Sequence[Channel], axes: Sequence[Axis]) -> np.ndarray:
+    """When channels begin (n,) in s after the first; who does not say so begins with that.
+
+    A channel without a date begins with the others, if those begin together.
+    """
+    dates = [axis.date_s for axis in axes if axis.date_s is not None]
+    first, last = min(dates, default=0.0), max(dates, default=0.0)
+    undated = [c.name for c, a in zip(channels, axes, strict=True) if a.date_s is None and a.step]
+    if undated and last > first:
+        dated = next(c.name for c, a in zip(channels, axes, strict=True) if a.date_s is not None)
+        raise InputError(
+            f"{path}: {dated} and others say when they begin, {undated[0]} does not; export what "
+            f"was sampled together."
+        )
+    unknown = [axis.offset is None and axis.date_s is None for axis in axes]
+    begin = np.array([
+        np.nan if lacks else (first if a.date_s is None else a.date_s) - first + (a.offset or 0.0)
+        for a, lacks in zip(axes, unknown, strict=True)
+    ])  # fmt: skip
+    # Of different lengths, what states no start cannot be laid beside the others.
+    if all(unknown) or (any(unknown) and len({len(c.samples) for c in channels}) > 1):
+        return np.zeros(len(begin))
+    return np.nan_to_num(begin - np.nanmin(begin))
 
 
 def same_rate(one: Hit, other: Hit) -> bool:

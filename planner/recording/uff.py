@@ -14,7 +14,7 @@ import numpy as np
 from planner.errors import ForeignFileError, InputError
 from planner.recording.column_names import MOTIONS, Unit, lookup, lookup_ratio
 from planner.recording.records import Channel, End, FrfRecord, Record, TimeRecord, check_numbers
-from planner.recording.sampling import aligned, sampling_rate
+from planner.recording.sampling import Axis, aligned, sampling_rate
 
 if TYPE_CHECKING:
     import pyuff
@@ -203,7 +203,7 @@ def _time_record(path: Path, sets: list[dict[str, Any]]) -> TimeRecord:
         samples = np.asarray(s["data"], dtype=float) * factor
         channels.append(Channel(name, quantity, unit, direction, samples, str(node)))
     rate = _rate(path, sets[0])
-    together, cut = aligned(path, channels, [float(s["x"][0]) for s in sets], rate)
+    together, cut = aligned(path, channels, [Axis(offset=float(s["x"][0])) for s in sets], rate)
     return TimeRecord(path, rate, together, cut, _simulated(sets))
 
 
