@@ -25,13 +25,11 @@ from planner.recording.folder import files_in
 from planner.recording.lvm import read_lvm
 from planner.recording.mat5 import is_version_5, read_mat5
 from planner.recording.named_columns import Named, to_records
-from planner.recording.records import End, FrfRecord, Record, TimeRecord, check_records
+from planner.recording.records import MAX_BYTES, End, FrfRecord, Record, TimeRecord, check_records
 from planner.recording.stream import cut_into_hits
 from planner.recording.text_tables import read_text
 from planner.recording.uff import read_uff
 from planner.recording.wav import WAV, read_wav, scales_beside, self_contained
-
-MAX_BYTES = 512 * 1024 * 1024
 
 
 class ReadFile(NamedTuple):

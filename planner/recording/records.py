@@ -15,6 +15,7 @@ AXES = ("x", "y", "z")
 NOTICED = "noticed"  # kind of a fault that is no reason, but what the reader has to say
 # Chosen: far beyond any hammer, accelerometer or FRF in SI, and far from where squares overflow.
 LARGEST = 1e15
+MAX_BYTES = 512 * 1024 * 1024  # of a file
 SLOWEST_HZ, FASTEST_HZ = 1e-3, 1e9  # sampling rates; slower or faster is a wrong unit
 OF_TOOL = tuple(Dof(SENSOR, axis) for axis in AXES)
 # The force belongs to the pulse where it exceeds this share of the peak and this many sds of noise.

@@ -13,7 +13,15 @@ import numpy as np
 
 from planner.errors import ForeignFileError, InputError
 from planner.recording.column_names import MOTIONS, Unit, lookup, lookup_ratio
-from planner.recording.records import Channel, End, FrfRecord, Record, TimeRecord, check_numbers
+from planner.recording.records import (
+    MAX_BYTES,
+    Channel,
+    End,
+    FrfRecord,
+    Record,
+    TimeRecord,
+    check_numbers,
+)
 from planner.recording.sampling import Axis, aligned, sampling_rate
 
 if TYPE_CHECKING:
@@ -294,7 +302,7 @@ def read_geometry(paths: tuple[Path, ...]) -> Geometry | None:
     position: dict[str, np.ndarray] = {}
     lines: list[tuple[str, str]] = []
     for path in paths:
-        if path.suffix.lower() in SUFFIXES:
+        if path.suffix.lower() in SUFFIXES and path.stat().st_size <= MAX_BYTES:
             found: list[Any] = []  # what cannot be read is left out: it is no measurement
             with opened(path) as (file, kinds):
                 for index, kind in enumerate(kinds):

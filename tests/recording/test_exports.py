@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from planner.recording.folder import read_poses, read_recordings
 from planner.recording.named_columns import Named, to_records
 from planner.recording.read import read
 from planner.recording.sampling import sampling_rate
+from planner.recording.uff import read_geometry
 from tests.support.uff_files import NONE, dataset_58, dataset_58b_mixed, units_164, write
 
 RATE = 512.0
@@ -210,6 +212,16 @@ def test_channels_that_begin_apart_are_aligned(tmp_path):
     away = dataset_58(1, ANSWER, answer, start=3.0)
     with pytest.raises(InputError, match="begin 3 s apart and have no time in common"):
         read(write(tmp_path / "b.uff", sets[0], away))
+
+
+def test_a_file_that_is_too_large_is_not_searched_for_points(tmp_path):
+    path = tmp_path / "large.uff"
+    with open(path, "wb") as file:
+        file.truncate((512 << 20) + 1)
+    with pytest.raises(InputError, match="larger than 512 MiB"):
+        read(path)
+    with mock.patch("pyuff.UFF", side_effect=AssertionError):
+        assert read_geometry((path,)) is None
 
 
 def test_a_column_of_times_for_each_channel(tmp_path):
