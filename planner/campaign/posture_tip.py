@@ -87,9 +87,9 @@ def _hit(folder: Path, pose: str | None) -> tuple[np.ndarray, np.ndarray, dict[s
     matrices = {}
     for name, own in sources.items():
         given = frf_set(tuple(own), None)
-        if given is None:
+        if given is None or given.matrix is None:
             raise InputError(f"Pose {name} has no FRFs between points; export those between two.")
-        matrices[name] = given.matrix(None)
+        matrices[name] = given.matrix
     return x, at, matrices
 
 

@@ -79,9 +79,9 @@ def modes(
     if operating:
         return respond(modal_analysis.operating_report(paths, band_hz, pictures), as_json)
     sources = modal_analysis.sources_of(paths, from_names)
-    given = None if force else frf_set(sources, band_hz, estimator, window_rate_1_s)
-    if given is not None and given.placed:
-        answer = modal_analysis.matrix_report(given, quantity, pictures, real, export)
+    given = None if force else frf_set(sources, band_hz, estimator, window_rate_1_s, quantity)
+    if given is not None and given.matrix is not None:
+        answer = modal_analysis.matrix_report(given, given.matrix, pictures, real, export)
     elif for_points:
         what = "FRFs without directions" if given else "hits of one pose"
         raise InputError(

@@ -8,7 +8,6 @@ from planner.campaign.labels import from_modal
 from planner.campaign.state import Measurement
 from planner.dataset.measure import MeasuredPose
 from planner.dataset.screened_files import Source
-from planner.dataset.store import user_store
 from planner.dataset.visits import Recording
 from planner.errors import RefusedFile
 from planner.frf.frf import Frf
@@ -41,8 +40,8 @@ class PoseFiles:
     @property
     def measured(self) -> MeasuredPose:
         """Its recordings, read when something is asked that the user's store does not hold."""
-        rate, store = self.table.window_rate_1_s, user_store()
-        return MeasuredPose(self.files, self.table.band_hz, window_rate_1_s=rate, store=store)
+        table = self.table
+        return MeasuredPose(self.files, table.band_hz, window_rate_1_s=table.window_rate_1_s)
 
 
 def poses_of(

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from planner.dataset.measure import DEFAULT_BAND_HZ, MeasuredPose
 from planner.dataset.screened_files import Source, in_parts, told_of_files
-from planner.dataset.store import user_store
-from planner.errors import PlannerError, RefusedError, RefusedFile
+from planner.errors import InputError, PlannerError, RefusedError, RefusedFile
 from planner.frf.matrix import FrfMatrix, matrix_of, matrix_of_hits
 from planner.recording.points import ANYWHERE
 from planner.recording.read import read
@@ -21,9 +20,9 @@ from planner.recording.uff import read_geometry
 class FrfSet:
     """FRFs, and what became of the files that they are from.
 
-    `band_hz` is where modes are looked for, None: wherever there are lines. Not `placed` are those
-    that state neither where nor along which directions they were measured. `from_hits` is the
-    matrix of hits, `records` are FRFs that were exported, with their rate as in `Frf`.
+    `band_hz` is where modes are looked for, None: wherever there are lines. `records` are FRFs that
+    were exported; `matrix` is None of those that state neither where nor along which directions
+    they were measured.
     """
 
     records: tuple[FrfRecord, ...]
@@ -31,17 +30,8 @@ class FrfSet:
     accepted: tuple[str, ...]
     refused: tuple[RefusedFile, ...]
     band_hz: tuple[float, float] | None
-    placed: bool
-    exponential_rate_1_s: float = 0.0
-    from_hits: FrfMatrix | None = None
+    matrix: FrfMatrix | None
     remarks: tuple[str, ...] = ()
-
-    def matrix(self, quantity: str | None) -> FrfMatrix:
-        """The FRFs by places. Raises RefusedError or InputError as `matrix_of`."""
-        if self.from_hits is not None:
-            return self.from_hits
-        found = matrix_of(self.records, quantity)
-        return replace(found, exponential_rate_1_s=self.exponential_rate_1_s)
 
 
 def frf_set(
@@ -49,11 +39,13 @@ def frf_set(
     band_hz: tuple[float, float] | None,
     estimator: str = "h1",
     window_rate_1_s: float = 0.0,
+    quantity: str | None = None,
 ) -> FrfSet | None:
     """The FRFs of files; None where they are of one point with all its three responses.
 
     That is a pose, be it hits or FRFs, and read elsewhere. The first file that can be read says
-    which of both is meant. Raises RefusedError where no hit can be used.
+    which of both is meant. `quantity` says what FRFs are whose file does not. Raises RefusedError
+    where no hit can be used, and as `matrix_of`.
     """
     held, refused = _read(sources)
     records = [record for _, own in held for record in own]
@@ -74,15 +66,12 @@ def frf_set(
     placed, one_sensor = _placed(given)
     if not given or one_sensor:
         return None
-    return FrfSet(
-        tuple(given),
-        tuple(source.path for source in sources),
-        tuple(used),
-        tuple(refused),
-        band_hz,
-        placed,
-        window_rate_1_s,
-    )
+    if not placed and window_rate_1_s:
+        raise InputError("--window-rate is for hits, and for FRFs that state their directions.")
+    matrix = matrix_of(given, quantity) if placed else None
+    matrix = matrix and replace(matrix, exponential_rate_1_s=window_rate_1_s)
+    files = tuple(source.path for source in sources)
+    return FrfSet(tuple(given), files, tuple(used), tuple(refused), band_hz, matrix)
 
 
 def _read(
@@ -130,7 +119,7 @@ def _struck(
     named = (replace(s, stated=replace(s.stated, names=ANYWHERE)) for s in sources)
     parts = in_parts(tuple(s for s in named if read_geometry((s.path,)) is None))
     band = band_hz or _band(parts)
-    measured = MeasuredPose(parts, band, estimator, window_rate_1_s, store=user_store())
+    measured = MeasuredPose(parts, band, estimator, window_rate_1_s)
     verdicts, frf, ended = measured.verdicts, measured.whole, measured.ended_frf
     refused = tuple(RefusedFile(v.source.name, v.reason) for v in verdicts if not v.accepted)
     if frf is None or ended is None:
@@ -139,16 +128,9 @@ def _struck(
     used = [v for v in verdicts if v.accepted]
     path, simulated = used[0].source.path, any(v.simulated for v in used)
     plain, windowed = (matrix_of_hits(one, path, simulated) for one in (frf, ended))
-    return FrfSet(
-        (),
-        tuple(source.path for source in sources),
-        tuple(v.source.name for v in used),
-        refused,
-        band,
-        True,
-        from_hits=replace(plain, ended=windowed),
-        remarks=told_of_files(verdicts),
-    )
+    files, accepted = (tuple(s.path for s in sources), tuple(v.source.name for v in used))
+    matrix = replace(plain, ended=windowed)
+    return FrfSet((), files, accepted, refused, band, matrix, told_of_files(verdicts))
 
 
 def _placed(frfs: Sequence[FrfRecord]) -> tuple[bool, bool]:

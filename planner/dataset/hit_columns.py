@@ -8,7 +8,6 @@ import numpy as np
 from planner.dataset.dataset import LAID
 from planner.dataset.measure import MeasuredPose, frf_of, of_tool
 from planner.dataset.screened_files import Source
-from planner.dataset.store import user_store
 from planner.frf.estimator import usable_band
 from planner.frf.frf import Frf
 from planner.frf.spectra import transform
@@ -113,7 +112,8 @@ def hits_of(
     corrected: Correction | None = None,
 ) -> PoseHits:
     """Those of files that were accepted before, kept like FRFs unless they are `corrected`."""
-    pose = MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
+    how = band_hz, "h1", window_rate_1_s
+    pose = MeasuredPose(sources, *how)
 
     def make() -> PoseHits:
         read = [source.read() for source in sources]
@@ -126,7 +126,6 @@ def hits_of(
         if at_tool:
             file, hits = zip(*at_tool, strict=True)
             columns = hit_columns(hits, file, band_hz, window_rate_1_s)
-        how = band_hz, "h1", window_rate_1_s
         whole = frf_of(every, records, *how)
         one_hit = MeasuredPose((), *how, given=every).one_hit_frf if every else None
         nothing = np.full((3, 3, len(whole.frequency_hz)), np.nan)

@@ -1,7 +1,7 @@
 """From the files of one pose to its modes: read, screen, average, identify; each step once."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -51,8 +51,8 @@ class Decomposed:
 class MeasuredPose:
     """One pose's recordings and what follows from them, computed when first asked for and kept.
 
-    FRFs and modes are looked up in `store` before files are read. `given` are hits that are at
-    hand already and are used as they are; there are no files then, and nothing is stored.
+    FRFs and modes are looked up in `store`, the user's, before files are read. `given` are hits
+    that are at hand already and are used as they are; there are no files then, nothing is stored.
     """
 
     sources: tuple[Source, ...]
@@ -60,7 +60,7 @@ class MeasuredPose:
     estimator: str = "h1"
     window_rate_1_s: float = 0.0  # of an exponential window that the analyser laid over all
     given: tuple[Hit, ...] = ()
-    store: Store | None = None
+    store: Store = field(default_factory=user_store)
 
     @cached_property
     def files(self) -> ScreenedFiles:
@@ -143,12 +143,11 @@ class MeasuredPose:
     @property
     def is_kept(self) -> bool:
         """Whether FRF and modes are in the store, so that they cost nothing."""
-        store = self.store
-        return store is not None and all(store.has(self._key(what)) for what in ("frf", "modes"))
+        return all(self.store.has(self._key(what)) for what in ("frf", "modes"))
 
     def kept(self, what: str, kind: type[T], make: Callable[[], T]) -> T:
         """From the store, or made and kept there."""
-        if self.store is None or self.given:
+        if self.given:
             return make()
         key = self._key(what)
         found = self.store.get(key, kind)
@@ -242,8 +241,7 @@ def measure(
     all channels: it is part of what is fitted, so that damping comes out without it. Results are
     looked up in `store`, by default the user's.
     """
-    store = store or user_store()
-    found = MeasuredPose(sources, band_hz, estimator, window_rate_1_s, store=store)
+    found = MeasuredPose(sources, band_hz, estimator, window_rate_1_s, (), store or user_store())
     _ = found.decomposed  # so that what is wrong with the files is said here
     return found
 

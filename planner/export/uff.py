@@ -1,9 +1,6 @@
 """Universal files: FRFs and coherences as dataset 58, modes as dataset 55, by pyuff."""
 
-import io
-import warnings
 from collections.abc import Iterable, Sequence
-from contextlib import redirect_stdout
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -14,6 +11,7 @@ from planner.campaign.events import MeasuredMode
 from planner.frf.synthesis import pole
 from planner.recording.points import Dof
 from planner.recording.records import AXES
+from planner.recording.uff import quiet
 
 HIT, SENSOR = (1, "HIT"), (2, "SENSOR")  # nodes of the tool: numbers and names
 FRF, COHERENCE = 4, 6  # function types of dataset 58
@@ -30,8 +28,7 @@ def write_sets(path: Path, sets: Iterable[Dataset]) -> None:
     with TemporaryDirectory() as aside, open(path, "wb") as file:
         for k, one in enumerate(sets):
             piece = Path(aside) / f"{k}.uff"
-            with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
-                warnings.simplefilter("ignore")
+            with quiet():
                 pyuff.UFF(str(piece)).write_sets([one], "add")
             file.write(piece.read_bytes())
 

@@ -289,10 +289,10 @@ def named_from(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> Na
             )
     held = {n: c.values for n, c in zip(names, columns, strict=True)}
     units = {n: c.unit for n, c in zip(names, columns, strict=True) if c.unit}
-    steps = {n: axis.step for n, axis in axes.items() if axis.step}
-    if steps and any(axis.quantity == "frequency" for axis in axes.values()):
+    step = common_step(file, {n: axis.step for n, axis in axes.items() if axis.step})
+    if step and any(axis.quantity == "frequency" for axis in axes.values()):
         first = min((a.offset for a in axes.values() if a.offset is not None), default=0.0)
-        lines = np.arange(max(map(len, held.values()))) * common_step(file, steps) + first
+        lines = np.arange(max(map(len, held.values()))) * step + first
         held = {"frequency_hz": lines, **held}
         if not holds_frfs(Named(held)):
             raise InputError(

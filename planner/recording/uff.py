@@ -76,12 +76,19 @@ def read_uff(path: Path) -> tuple[Record, ...]:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[tuple["pyuff.UFF", list[int]]]:
-    """A universal file and the kinds of its datasets, without the parser's chatter."""
-    import pyuff
-
+def quiet() -> Iterator[None]:
+    """Without the chatter of the library that reads and writes universal files."""
     with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
         warnings.simplefilter("ignore")
+        yield
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[tuple["pyuff.UFF", list[int]]]:
+    """A universal file and the kinds of its datasets."""
+    import pyuff
+
+    with quiet():
         file = pyuff.UFF(str(path))
         yield file, [int(kind) for kind in file.get_set_types()]
 

@@ -15,7 +15,7 @@ from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.diagnosis.exponential_window import screen_window
 from planner.errors import InputError, RefusedError, RefusedFile
 from planner.frf.frf import Frf
-from planner.frf.matrix import joined
+from planner.frf.matrix import FrfMatrix, joined
 from planner.frf.synthesis import DERIVATIVE
 from planner.modal.estimate_modes import PoleIdentification, identification
 from planner.modal.matrix_modes import modes_of_matrix, with_normal_modes
@@ -160,8 +160,6 @@ def unlabelled_report(given: FrfSet, quantity: str | None, pictures: Pictures) -
 
     In the order of the files. Raises InputError or RefusedError in one sentence.
     """
-    if given.exponential_rate_1_s:
-        raise InputError("--window-rate is for hits, and for FRFs that state their directions.")
     record = joined(given.records)
     modal = modes_from_transfer_functions(record, quantity, given.band_hz)
 
@@ -178,14 +176,14 @@ def unlabelled_report(given: FrfSet, quantity: str | None, pictures: Pictures) -
 
 
 def matrix_report(
-    given: FrfSet, quantity: str | None, pictures: Pictures, real: bool, files_to: Path | None
+    given: FrfSet, matrix: FrfMatrix, pictures: Pictures, real: bool, files_to: Path | None
 ) -> Done:
-    """Of FRFs between any points.
+    """Of the matrix of FRFs between any points.
 
     With `real` the shapes are the real normal modes behind the complex ones; `files_to` is a folder
     for universal files and tables. Raises InputError or RefusedError in one sentence.
     """
-    matrix, geometry = given.matrix(quantity), read_geometry(given.files)
+    geometry = read_geometry(given.files)
     found = modes_of_matrix(matrix, given.band_hz, geometry)
     found = with_normal_modes(found) if real else found
     exports: tuple[str, ...] = ()

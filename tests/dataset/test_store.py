@@ -162,7 +162,7 @@ def no_reading(*_):
 
 def test_a_pose_is_computed_once(sources, tmp_path, monkeypatch):
     first = MeasuredPose(sources, BAND_HZ, store=Store(tmp_path))
-    plain = MeasuredPose(sources, BAND_HZ)
+    plain = MeasuredPose(sources, BAND_HZ, store=Store(None))
     agree(first, plain)
     monkeypatch.setattr(measuring, "read_files", no_reading)
     again = MeasuredPose(sources, BAND_HZ, store=Store(tmp_path))
@@ -194,7 +194,7 @@ def test_another_program_parameter_or_axis_is_another_result(kept, change, monke
         monkeypatch.setattr(content_hash, "program", lambda *packages: "another")
     other = replace(kept, **(change(kept) if change else {}))
     assert not other.is_kept
-    agree(other, replace(other, store=None))
+    agree(other, replace(other, store=Store(None)))
 
 
 def test_a_byte_more_in_a_file_is_another_result(kept):
