@@ -102,10 +102,7 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
     source = record.source
     forces = [c for c in record.channels if c.quantity == "force"]
     if len(forces) != 1:
-        raise InputError(
-            f"{source} holds {describe(record)}: a hit needs exactly one force in N; "
-            + _unit_or(record, "export force and accelerations together.")
-        )
+        raise _lacking(record, "exactly one force in N", "export force and accelerations together")
     accelerations = [c for c in record.channels if c.quantity == "acceleration"]
     accelerations, left_out = _at_points(accelerations, stated)
     responses = _responses(record, accelerations, stated)
@@ -159,52 +156,37 @@ def _at_points(
 def _responses(
     record: TimeRecord, accelerations: Sequence[Channel], stated: StatedPoints
 ) -> dict[Dof, Channel]:
-    """Accelerations by point and axis; of the tool's sensor, where it stands alone, all three."""
-    if stated.names.anywhere:
-        return _anywhere(record, accelerations, stated)
-    found: dict[Dof, Channel] = {}
-    for channel in accelerations:
-        if not _along(channel.direction):
-            break
-        point = _axis_there(record.source, stated, channel.node, channel.direction)
-        found[Dof(point, _along(channel.direction))] = channel
-    whole = 0 < len(found) == len(accelerations)
-    tool = stated.names.axes_of(SENSOR)
-    of_tool = [dof.direction for dof in found if dof.node == SENSOR]
-    if not whole or (of_tool and not set(of_tool) >= set(tool)):
-        raise InputError(
-            f"{record.source} holds {describe(record)}: a hit needs one acceleration in each of x, "
-            "y and z; " + _unit_or(record, "export all three with their directions.")
-        )
-    return found
+    """Accelerations by point and axis; of the tool's sensor, where it stands alone, all three.
 
-
-def _anywhere(
-    record: TimeRecord, accelerations: Sequence[Channel], stated: StatedPoints
-) -> dict[Dof, Channel]:
-    """The same of points that belong to no robot, any number of them.
-
-    A channel without a direction is a point by itself, as if it had an axis x only.
+    Of points that belong to no robot any number: a channel without a direction is one by itself, as
+    if it had an axis x only.
     """
     found: dict[Dof, Channel] = {}
+    names = stated.names
     for channel in accelerations:
-        node = stated.response_at(record.source, channel.node)
-        along = abs(channel.direction)
-        if not along:
-            node = (channel.name if node == SENSOR else node) + NOT_STATED
-        dof = Dof(node, AXES[along - 1 if along else 0]) if along <= len(AXES) else None
-        if dof is None or dof in found:
-            fault = "has its place and direction twice" if dof else "is a rotation"
-            raise InputError(
-                f"{record.source}: {channel.name} {fault}; state node and direction of each "
-                f"acceleration, or leave it out."
-            )
-        found[dof] = channel
-    if not found:
-        raise InputError(
-            f"{record.source} holds {describe(record)}: a hit needs an acceleration; "
-            + _unit_or(record, "export force and accelerations together.")
-        )
+        along = _along(channel.direction)
+        if names.anywhere:
+            node = stated.response_at(record.source, channel.node)
+            if not channel.direction:
+                node, along = (channel.name if node == SENSOR else node) + NOT_STATED, AXES[0]
+            if not along or Dof(node, along) in found:
+                fault = "has its place and direction twice" if along else "is a rotation"
+                raise InputError(
+                    f"{record.source}: {channel.name} {fault}; state node and direction of each "
+                    f"acceleration, or leave it out."
+                )
+        elif along:
+            node = _axis_there(record.source, stated, channel.node, channel.direction)
+        else:
+            break
+        found[Dof(node, along)] = channel
+    if names.anywhere and not found:
+        raise _lacking(record, "an acceleration", "export force and accelerations together")
+    of_tool = {dof.direction for dof in found if dof.node == SENSOR}
+    whole = not of_tool or of_tool >= set(names.axes_of(SENSOR))
+    if not names.anywhere and not (whole and 0 < len(found) == len(accelerations)):
+        needs = "one acceleration in each of x, y and z"
+        raise _lacking(record, needs, "export all three with their directions")
     return found
 
 
@@ -240,13 +222,12 @@ def without_unit(record: TimeRecord) -> str:
     return ", ".join(c.name for c in record.channels if c.quantity == "unknown")
 
 
-def _unit_or(record: TimeRecord, remedy: str) -> str:
-    """What to do about channels whose unit is not known, else another `remedy`."""
+def _lacking(record: TimeRecord, needs: str, remedy: str) -> InputError:
+    """That a record is no hit, for which it `needs` something; units may be all that is missing."""
     if nameless := without_unit(record):
-        return (
-            f"the unit of {nameless} is not known: name columns such as Force [N] and Acc X [m/s²]."
-        )
-    return remedy
+        remedy = f"the unit of {nameless} is not known: name columns such as Force [N] and Acc X "
+        remedy += "[m/s²]"
+    return InputError(f"{record.source} holds {describe(record)}: a hit needs {needs}; {remedy}.")
 
 
 def describe(record: TimeRecord) -> str:
