@@ -38,7 +38,7 @@ def test_figures_are_the_sums_of_the_paper():
     assert metrics.agreement(measured, simulated).frobenius == pytest.approx(similarity)
 
 
-@settings(deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(frfs(), frfs())
 def test_bounds_and_symmetry(a, b):
     for figure in (metrics.frac, metrics.complex_frac):
@@ -51,7 +51,7 @@ def test_bounds_and_symmetry(a, b):
     assert 0 <= similarity <= 1
 
 
-@settings(deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(frfs(), frfs(), st.floats(1e-3, 1e3), st.floats(0, 6.3), st.permutations(range(6)))
 def test_what_does_not_count(a, b, scale, angle, order):
     """A complex factor for FRAC, the phase of each line for magnitudes, the order of lines."""
@@ -67,7 +67,7 @@ def test_what_does_not_count(a, b, scale, angle, order):
         assert metrics.agreement(*pair).frobenius == pytest.approx(similarity, abs=1e-9)
 
 
-@settings(deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(frfs(), st.floats(0.0, 3.0))
 def test_frobenius_similarity_knows_the_amplitude(a, scale):
     assume(np.any(a != 0))
