@@ -8,7 +8,7 @@ holder is a matrix exponential: exact for a uniform segment, of fourth order (Ma
 et al., Phys. Rep. 470, 2009) in the slices of a tapered one.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
 
@@ -123,41 +123,24 @@ class Section:
         ring = (1 + m2) ** 2
         return 6 * (1 + nu) * ring / ((7 + 6 * nu) * ring + (20 + 12 * nu) * m2)
 
-    def bending(self, omega: np.ndarray) -> np.ndarray:
-        """(F, 4, 4) by which (x, θy, force x, moment y) changes along the axis, towards the tip."""
-        m = self.material
-        a = np.zeros((len(omega), 4, 4), complex)
-        a[:, 0, 1] = 1
-        a[:, 0, 2] = 1 / (self.shear_coefficient * m.shear_modulus * self.area)
-        a[:, 1, 3] = 1 / (m.modulus * self.second_moment)
-        a[:, 2, 0] = -m.density_kg_m3 * self.area * omega**2
-        a[:, 3, 1] = -m.density_kg_m3 * self.second_moment * omega**2
-        a[:, 3, 2] = -1
-        return a
-
-    def stretching(self, omega: np.ndarray) -> np.ndarray:
-        """(F, 2, 2) of (z, force z)."""
-        m = self.material
-        return _rod(omega, m.modulus * self.area, m.density_kg_m3 * self.area)
-
-    def twisting(self, omega: np.ndarray) -> np.ndarray:
-        """(F, 2, 2) of (θz, moment z)."""
-        m, polar = self.material, 2 * self.second_moment
-        return _rod(omega, m.shear_modulus * polar, m.density_kg_m3 * polar)
-
-
-def _rod(omega: np.ndarray, stiffness: complex, inertia: float) -> np.ndarray:
-    a = np.zeros((len(omega), 2, 2), complex)
-    a[:, 0, 1] = 1 / stiffness
-    a[:, 1, 0] = -inertia * omega**2
-    return a
+    @property
+    def slope(self) -> tuple[np.ndarray, np.ndarray]:
+        """(12, 12) of which the first + ω² times the second is how the state changes, tipwards."""
+        m, area, second = self.material, self.area, self.second_moment
+        shear, bending = self.shear_coefficient * m.shear_modulus * area, m.modulus * second
+        twisting, k = 2 * m.shear_modulus * second, np.arange(6)
+        still, moving = np.zeros((12, 12), complex), np.zeros((12, 12))
+        still[k, 6 + k] = 1 / np.array([shear, shear, m.modulus * area, bending, bending, twisting])
+        # A section that turns moves the next one across, and a force across turns it.
+        still[0, 4], still[1, 3], still[10, 6], still[9, 7] = 1, -1, -1, 1
+        moving[6 + k, k] = -m.density_kg_m3 * np.array([area] * 3 + [second, second, 2 * second])
+        return still, moving
 
 
 # Which of the twelve numbers of a state belong together. In the second plane a rotation about −x
 # does what one about y does in the first.
-FIRST_PLANE, SECOND_PLANE = (0, 4, 6, 10), (1, 3, 7, 9)
-AXIAL, TORSION = (2, 8), (5, 11)
-TURNED = np.array([1.0, -1.0, 1.0, -1.0])
+FIRST_PLANE, SECOND_PLANE, AXIAL, TORSION = (0, 4, 6, 10), (1, 3, 7, 9), (2, 8), (5, 11)
+TURNED = np.outer((1.0, -1.0, 1.0, -1.0), (1.0, -1.0, 1.0, -1.0))
 
 
 def transfer(segments: Sequence[Segment], omega: np.ndarray) -> np.ndarray:
@@ -178,27 +161,27 @@ def transfer(segments: Sequence[Segment], omega: np.ndarray) -> np.ndarray:
 def _segment(segment: Segment, lines: bytes) -> np.ndarray:
     omega = np.frombuffer(lines)
     out, each = np.zeros((len(omega), 12, 12), complex), range(len(omega))
-    bent = _along(segment, Section.bending, omega)
-    out[np.ix_(each, FIRST_PLANE, FIRST_PLANE)] = bent
-    out[np.ix_(each, SECOND_PLANE, SECOND_PLANE)] = bent * np.outer(TURNED, TURNED)
-    out[np.ix_(each, AXIAL, AXIAL)] = _along(segment, Section.stretching, omega)
-    out[np.ix_(each, TORSION, TORSION)] = _along(segment, Section.twisting, omega)
+    for part in (FIRST_PLANE, AXIAL, TORSION):
+        out[np.ix_(each, part, part)] = found = _along(segment, omega, part)
+        if part == FIRST_PLANE:
+            out[np.ix_(each, SECOND_PLANE, SECOND_PLANE)] = TURNED * found
     # The mass at its tip's side: motion there takes a force.
-    pushed = segment.mass * (omega**2)[:, None, None] * out[:, :, 6:9]
-    out[:, :, :3] += pushed
+    out[:, :, :3] += segment.mass * (omega**2)[:, None, None] * out[:, :, 6:9]
     return out
 
 
-def _along(
-    segment: Segment, slope: Callable[[Section, np.ndarray], np.ndarray], omega: np.ndarray
-) -> np.ndarray:
+def _along(segment: Segment, omega: np.ndarray, part: tuple[int, ...]) -> np.ndarray:
     """From the tip's side of a segment to its holder's: the exponential of −slope·length."""
+
+    def slope(place: float) -> np.ndarray:
+        still, moving = (each[np.ix_(part, part)] for each in segment.at(place).slope)
+        return still + moving * (omega**2)[:, None, None]
+
     if segment.end_diameter == segment.diameter:
-        return expm(-segment.length * slope(segment.at(0.0), omega))
-    step, k = segment.length / SLICES, np.arange(SLICES)
+        return expm(-segment.length * slope(0.0))
+    step, middle = segment.length / SLICES, (np.arange(SLICES) + 0.5) / SLICES
     near, far = (
-        np.array([slope(segment.at(place), omega) for place in (k + 0.5 + side * GAUSS) / SLICES])
-        for side in (-1, 1)
+        np.array([slope(place + side * GAUSS / SLICES) for place in middle]) for side in (-1, 1)
     )
     # Run towards the holder, the far point comes first.
     bracket = near @ far - far @ near

@@ -32,7 +32,6 @@ the direction that cut.toml calls `axis`; the `axis` of older tool files, from t
 tip, still means that.
 """
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -204,10 +203,7 @@ class ToolTable(msgspec.Struct, forbid_unknown_fields=True):
 
 def load_tool(path: Path) -> Tool:
     """A tool from its TOML file; InputError naming the file, the fault and the remedy."""
-    try:
-        table = load_toml(path, ToolTable, "tool.toml")
-    except InputError as error:
-        raise InputError(_with_unit(path, str(error), str(error.__cause__))) from None
+    table = load_toml(path, ToolTable, "tool.toml")
     _check(path, table)
     parts = tuple(
         Segment(s.length_m, *s.bending, table.material[s.material], s.bore_m, s.mass_kg, s.contact)
@@ -228,28 +224,6 @@ def load_tool(path: Path) -> Tool:
             parts = loaded(tool.parts, point.from_tip_m, point.sensor_mass_kg)
             tool = replace(tool, parts=parts)
     return tool
-
-
-UNITS = {
-    "length": "length_m", "diameter": "diameter_m", "end_diameter": "end_diameter_m",
-    "bore": "bore_m", "mass": "mass_kg", "density": "density_kg_m3", "from_tip": "from_tip_m",
-    "youngs_modulus": "youngs_modulus_pa", "stiffness": "stiffness_n_m and stiffness_nm_rad",
-    "damping": "damping_ns_m and damping_nms_rad", "place_sd": "place_sd_m",
-    "equivalent_diameter": "equivalent_diameter_m", "sensor_mass": "sensor_mass_kg",
-}  # fmt: skip
-
-
-def _with_unit(path: Path, sentence: str, fault: str) -> str:
-    """The `fault` in words where a key only lacks its unit, or has another one."""
-    found = re.search(r"unknown field `(\w+)`(?:.*at `([^`]+)`)?", fault)
-    if found is None:
-        return sentence
-    key, place = found.group(1), (found.group(2) or "").removeprefix("$.")
-    stem = max((s for s in UNITS if key == s or key.startswith(f"{s}_")), key=len, default=None)
-    if stem is None:
-        return sentence
-    where = f"{path}, {place}" if place else str(path)
-    return f"{where}: {key} does not state the unit that is read here; write {UNITS[stem]}."
 
 
 def _check(path: Path, table: ToolTable) -> None:

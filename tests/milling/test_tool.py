@@ -78,10 +78,10 @@ def test_a_section_within_a_tool(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("length_m = 0.04", "length = 0.04", "write length_m"),
-        ("length_m = 0.04", "length_mm = 40", "write length_m"),
-        ("density_kg_m3 = 7850.0", "density = 7850.0", "write density_kg_m3"),
-        ("stiffness_n_m = 5e7", "stiffness = 5e7", "write stiffness_n_m"),
+        ("length_m = 0.04", "length = 0.04", '"length_m" may be meant'),
+        ("length_m = 0.04", "length_mm = 40", '"length_m" may be meant'),
+        ("density_kg_m3 = 7850.0", "density = 7850.0", '"density_kg_m3" may be meant'),
+        ("stiffness_n_m = 5e7", "stiffness = 5e7", '"stiffness_n_m" may be meant'),
         ("length_m = 0.04", "length_m = -0.04", "segment 1: length_m is -0.04"),
         ("diameter_m = 0.02\nbore", "diameter_m = nan\nbore", "diameter_m is nan"),
         ("length_m = 0.04", "length_m = inf", "length_m is inf"),
