@@ -223,18 +223,9 @@ def by_mode(scores: list[RobotScores]) -> Table:
     )  # fmt: skip
 
 
-def kinds_figure(table: Table) -> Figure:
-    """The table by kind as bars."""
-    return _figure(table, "Modal parameters of all postures, by cross-validation", -0.5)
-
-
-def modes_figure(table: Table) -> Figure:
-    """The table by mode as bars."""
-    return _figure(table, "Natural frequencies, by cross-validation", 0.0)
-
-
-def _figure(table: Table, title: str, floor: float) -> Figure:
-    figure, grid = panels((10.0, 6.4), title, 2)
+def figure(table: Table, title: str, floor: float) -> Figure:
+    """A table by kind or by mode as bars; what lies below `floor` is cut."""
+    figure, grid = panels((10.0, 6.4), f"{title}, by cross-validation", 2)
     values = np.array([row[1:] for row in table.rows], dtype=float)
     groups = [str(row[0]) for row in table.rows]
     mean = values[:, [-1, *range(0, 2 * len(WAYS), 2)]]

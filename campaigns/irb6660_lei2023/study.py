@@ -94,7 +94,10 @@ def study(progress: ProgressCallback, small: bool = False) -> Report:
         (table, modes, cost),
         [figures(one, cost) for one in scored],
         _notes(scored, cost),
-        {"lei2023_kinds": scores.kinds_figure(table), "lei2023_modes": scores.modes_figure(modes)},
+        {
+            "lei2023_kinds": scores.figure(table, "Modal parameters of all postures", -0.5),
+            "lei2023_modes": scores.figure(modes, "Natural frequencies", 0.0),
+        },
     )
 
 

@@ -203,8 +203,7 @@ def _predict(
 ) -> BeyondPrediction:
     """By the models that every number of experiments is given, or by all; every so manyth low."""
     lines, angles = seen.simulated_axes
-    kept = slice(None, None, coarse), slice(None, None, coarse)
-    low = Grid(lines[kept[0]], angles[kept[1]], seen.simulated[kept])
+    low = Grid(lines[::coarse], angles[::coarse], seen.simulated[::coarse, ::coarse])
     measured = Grid(seen.lines_hz, seen.angles_deg, seen.amplitude)
     at, count = (seen.lines_hz, BEYOND_DEG), len(seen.angles_deg)
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import msgspec
 import numpy as np
+from scipy.spatial.distance import pdist
 from scipy.stats import qmc
 
 from planner.campaign.cell import Cell
@@ -17,6 +18,7 @@ from planner.campaign.config import load_campaign_config
 from planner.campaign.labels import from_mode, label, observations
 from planner.campaign.state import Measurement
 from planner.demo import NAME, shipped
+from planner.design import space_filling
 from planner.frf.frf import Frf
 from planner.progress import ProgressCallback, part_of
 from planner.proof.deviation import Deviation, soft_floor
@@ -114,19 +116,9 @@ def split(x: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
     designs = [
         qmc.LatinHypercube(x.shape[1], rng=rng).random(TRAINED) for _ in range(TRIED_DESIGNS)
     ]
-    points = max(designs, key=_least_distance)
-    chosen: list[int] = []
-    for point in points:
-        distance = np.linalg.norm(x - point, axis=1)
-        distance[chosen] = np.inf
-        chosen.append(int(np.argmin(distance)))
-    train = rng.permutation(chosen)
+    points = max(designs, key=lambda design: float(pdist(design).min()))
+    train = rng.permutation(space_filling.nearest(x, points, TRAINED))
     return train, np.setdiff1d(np.arange(len(x)), train)
-
-
-def _least_distance(points: np.ndarray) -> float:
-    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
-    return float(apart[np.triu_indices(len(points), 1)].min())
 
 
 def nearest(x: np.ndarray, values: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

@@ -160,31 +160,26 @@ def figure_12(seen: AnalysedPoses, small: bool = False) -> Rebuilt:
     seed = next(s for s in range(100) if target in split(seen.x, s)[1])
     train, there = split(seen.x, seed)[0][:TRAINED], np.array([target])
     frf = seen.frfs[target].within(BAND_HZ)
-    hz, measured, sd_measured = frf.frequency_hz, frf.accelerance, np.sqrt(frf.variance)
-    draws = FEW_DRAWS if small else DRAWS
+    hz, draws = frf.frequency_hz, FEW_DRAWS if small else DRAWS
     samples = np.abs(_published(seen, train, target, hz, draws))
     low, middle, high = np.quantile(samples, (0.025, 0.5, 0.975), axis=0)
     fitted = fit_surrogate(replace(seen.every[train], x=seen.x[train]))
     prediction = fitted.predict(seen.x[there], seen.every.simulated[there])
     mean, sd = (moment[0] for moment in frf_moments(prediction, hz))
     best = synthesised(seen.every, target, hz)
-    size = [np.abs(measured[i, j]) for i, j in PAIRS]
-    noise = [1.96 * sd_measured[i, j] for i, j in PAIRS]
-    inside = [(m > a - n) & (m < b + n) for m, a, b, n in zip(size, low, high, noise, strict=True)]
-    # |δH|² of a complex normal error exceeds 3.0 σ² in 5 % of all cases.
-    ours = [
-        np.abs(mean[i, j] - measured[i, j]) ** 2 < 3.0 * (sd[i, j] ** 2 + sd_measured[i, j] ** 2)
-        for i, j in PAIRS
-    ]
-    return Rebuilt(
-        _draw(hz, middle, (low, high), mean, size),
-        [float(r_squared(a, b)) for a, b in zip(middle, size, strict=True)],
-        [float(r_squared(np.abs(mean[p]), s)) for p, s in zip(PAIRS, size, strict=True)],
-        [float(r_squared(np.abs(best[p]), s)) for p, s in zip(PAIRS, size, strict=True)],
-        float(np.mean(inside)),
-        float(np.mean(ours)),
-        draws,
+    measured, noise, mean, sd, best = (
+        np.array([whole[pair] for pair in PAIRS])
+        for whole in (frf.accelerance, np.sqrt(frf.variance), mean, sd, best)
     )
+    size = np.abs(measured)
+    inside = (size > low - 1.96 * noise) & (size < high + 1.96 * noise)
+    # |δH|² of a complex normal error exceeds 3.0 σ² in 5 % of all cases.
+    ours = np.abs(mean - measured) ** 2 < 3.0 * (sd**2 + noise**2)
+    published, fused, known = (
+        r_squared(np.abs(told), size, 1).tolist() for told in (middle, mean, best)
+    )
+    drawn, within = _draw(hz, middle, (low, high), np.abs(mean), size), float(np.mean(inside))
+    return Rebuilt(drawn, published, fused, known, within, float(np.mean(ours)), draws)
 
 
 def synthesised(modes: ModalObservations, pose: int, hz: np.ndarray) -> np.ndarray:
@@ -249,16 +244,17 @@ def _moments(seen: AnalysedPoses, train: np.ndarray, target: int) -> tuple[np.nd
 
 
 def _draw(
-    hz: np.ndarray, middle: np.ndarray, band: tuple[np.ndarray, np.ndarray], mean: np.ndarray,
-    size: list[np.ndarray],
+    hz: np.ndarray, middle: np.ndarray, band: tuple[np.ndarray, np.ndarray], ours: np.ndarray,
+    size: np.ndarray,
 ) -> Figure:  # fmt: skip
+    """Of PAIRS (4, F) each."""
     title = f"Figure 12: FRFs at {TARGET_POSE}, predicted from five other poses"
     figure, grid = panels((10.0, 6.4), title, 2, 2)
     for k, (i, j) in enumerate(PAIRS):
         panel = grid[i, j]
         title = f"response {'xyz'[i]}, hit {'xyz'[j]}"
         drawing.frf(panel, hz, middle[k], (band[0][k], band[1][k]), title)
-        panel.plot(hz, np.abs(mean[i, j]), color="tab:green", lw=1.1, label="fused, ours")
+        panel.plot(hz, ours[k], color="tab:green", lw=1.1, label="fused, ours")
         panel.plot(hz, size[k], "k", lw=0.9, label="measured (simulated)")
         panel.set_ylim(0, 1.6 * float(np.max(size[k])))
     name_axes(figure, grid, "frequency (Hz)", "|H| (m/s²/N)")

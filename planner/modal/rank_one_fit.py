@@ -82,7 +82,7 @@ def fit_shape(
     `gain`: relative sd by which whole rows err, which only rows of points that are columns too can
     show; `near` (points,): a shape to start from. The shape has unit modal mass (kg^−½) in groups
     whose scale is known; in others rows and columns share the residue evenly. What no shape
-    explains more_than_springs the variance: that of each column by a factor, that of all entries in
+    explains widens the variance: that of each column by a factor, that of all entries in
     proportion to their size.
     """
     values = residue * 2j * damped_1_s
