@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from threadpoolctl import threadpool_limits
 
 from planner.milling.machine import Machine, multipliers
 from planner.milling.period import period
 from tests.support.milling_cases import MULTIPLIERS, cut, one_mode, semi_growth
-from tests.support.timing import spent
 
 RPM, DEPTH_MM = 5000.0, 0.5
 
@@ -41,22 +39,3 @@ def test_orders_of_convergence():
     assert order["full, degree 3"] > 3
     # One element of a high degree: the error falls faster than any power.
     assert full_error(asked, 28, 1) < 1e-2 * full_error(asked, 22, 1)
-
-
-def cpu(work) -> float:
-    """Least processor time of three calls in s."""
-    return min(spent(work)[2] for _ in range(3))
-
-
-@pytest.mark.slow
-def test_full_discretisation_costs_less_at_the_same_error():
-    asked = Machine(one_mode(), cut())
-    wanted = 1e-3
-    steps = next(m for m in range(40, 2000, 20) if semi_error(asked, m) < wanted)
-    degree = next(d for d in range(8, 60) if full_error(asked, d, 1) < wanted)
-    with threadpool_limits(1):
-        semi = cpu(lambda: semi_error(asked, steps))
-        full = cpu(lambda: full_error(asked, degree, 1))
-    print(f"|µ| within {wanted:g}: semi {steps} steps {1e3 * semi:.1f} ms, full degree {degree} "
-          f"{1e3 * full:.1f} ms, ratio {semi / full:.0f}")  # fmt: skip
-    assert full < semi

@@ -1,6 +1,5 @@
 """Times of benchmarks, and what JAX compiles, counted."""
 
-import statistics
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,17 +7,6 @@ from contextlib import contextmanager
 import jax
 
 COMPILED = "/jax/core/compile/backend_compile_duration"  # told by JAX, if kept on the disk too
-
-
-def seconds(action, repeats=7):
-    """Median after one warm-up."""
-    action()
-    taken = []
-    for _ in range(repeats):
-        started = time.perf_counter()
-        action()
-        taken.append(time.perf_counter() - started)
-    return statistics.median(taken)
 
 
 def spent(act):
