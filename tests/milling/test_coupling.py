@@ -129,7 +129,7 @@ def _rotation(a: float, phi: float) -> np.ndarray:
     return 1 / (a * (1 + phi) ** 2) * np.array(rows)
 
 
-FREQUENCY = np.concatenate([np.arange(5.0, 60.0, 0.25), np.arange(60.0, 1600.0, 5.0)])
+FREQUENCY = np.concatenate([np.arange(5.0, 60.0, 0.5), np.arange(60.0, 1600.0, 8.0)])
 CARBIDE = ToolMaterial(E, RHO, NU, LOSS)
 RIGID_ENOUGH = (6.25e7, 3.86e6, 175.0, 0.14)
 LOOSER = (4.5e7, 4.19e6, 210.0, 1.5)

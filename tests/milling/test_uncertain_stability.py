@@ -148,14 +148,6 @@ def noisy(modes: CutterModes, lines: np.ndarray, share: float, seed: int) -> Cut
     return of_accelerance("tap", lines, whole, None)
 
 
-@pytest.mark.parametrize("step_hz", [0.25, 2.0])
-def test_lines_in_the_noise_govern_nothing(step_hz: float):
-    """0.1 % noise, lines from the first on: divided by ω² these were pure noise."""
-    given, modes = cut(spindle_rpm=(5000.0, 20000.0, 8)), two_each_way()
-    frf = noisy(modes, step_hz * np.arange(1, int(2200 / step_hz)), 1e-3, 3)
-    check_limits(frf, modes, given, 0.03)
-
-
 def test_noise_is_sampled_as_wide_as_it_scatters():
     """Limits by other noises lie within the samples of one as often as these say."""
     given = cut(spindle_rpm=(9000.0, 12000.0, 3), method="zeroth_order")

@@ -32,7 +32,7 @@ def odd_ones(hits) -> dict[int, str]:
 
 def test_good_hits_are_not_refused_and_agree():
     rng = np.random.default_rng(0)
-    for _ in range(20):
+    for _ in range(8):
         hits = [make_hit(rng, axis, noise=0.1) for axis in ("+x", "-x", "+x", "+y") * 2]
         assert odd_ones(hits) == {}
         hits += [make_hit(rng, axis, rng.uniform(0.01, 0.1), rng.uniform(0.004, 0.012))

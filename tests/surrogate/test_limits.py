@@ -144,7 +144,7 @@ def test_frequencies_told_by_the_simulations_shapes_stand_beside_their_own_predi
 
 
 SQUARE = np.random.default_rng(5).random((200, 2))
-COUNTS, SEEDS = (3, 8), range(8)
+COUNTS, SEEDS = (3, 8), range(4)
 
 
 def truth(x):

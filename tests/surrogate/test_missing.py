@@ -6,10 +6,9 @@ import sys
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from planner.frf import synthesis
-from planner.surrogate.frf_bands import LARGEST_DAMPING, ModalPrediction, frf_moments, log_normal
+from planner.surrogate.frf_bands import LARGEST_DAMPING, frf_moments, log_normal
 from planner.surrogate.importance import normal_points
 from planner.surrogate.modal_surrogate import fit_surrogate
 from tests.support.surrogates import observed, simulated, true_hz
@@ -46,7 +45,7 @@ def test_before_any_measurement_a_mode_nobody_simulates_is_unknown():
 def test_one_gap_in_the_simulation_does_not_switch_it_off():
     """One pose without a simulated mode 3: as accurate as without the gap, and no surer."""
     errors, sds = [], []
-    for seed in range(2):
+    for seed in range(1):
         seen = observed(6, seed)
         unseen = seen.frequency_hz.copy()
         unseen[1, 2] = np.nan
@@ -124,14 +123,7 @@ def test_a_cache_that_cannot_be_kept_is_no_trouble(tmp_path):
     assert done.stdout.split() == ["2.0", "None"]
 
 
-LINES = np.linspace(4, 50, 60)
-
-
-def prediction(spread=None):
-    """Of a surrogate with five poses; `spread` is the relative sd of the frequencies."""
-    x = np.random.default_rng(0).random((2, 2))
-    p = fit_surrogate(observed(5, 0)).predict(x, simulated(x))
-    return p if spread is None else replace(p, frequency_sd_hz=spread * p.frequency_hz)
+LINES = np.linspace(4, 50, 20)
 
 
 def sampled(p, samples=10_000):
@@ -152,22 +144,10 @@ def sampled(p, samples=10_000):
     return np.array(means), np.array(sds)
 
 
-def test_a_certain_prediction_is_the_modal_sum():
+def test_moments_are_those_of_ten_thousand_samples():
     x = np.random.default_rng(0).random((2, 2))
-    low, zero = simulated(x), np.full((2, 4), 1e-9)
-    p = ModalPrediction(low.frequency_hz, zero, low.damping_ratio, zero * 0.01, low.residue,
-                        np.full((2, 4, 3, 3), 1e-18))  # fmt: skip
-    poles = synthesis.pole(low.frequency_hz, low.damping_ratio)
-    exact = synthesis.accelerance(LINES, poles, low.residue)
-    mean, sd = frf_moments(p, LINES)
-    size = np.abs(exact).max()
-    np.testing.assert_allclose(mean, exact, atol=1e-6 * size)
-    assert sd.max() < 1e-4 * size
-
-
-@pytest.mark.parametrize("spread", [None, 0.05])
-def test_moments_are_those_of_ten_thousand_samples(spread):
-    p = prediction(spread)
+    p = fit_surrogate(observed(5, 0)).predict(x, simulated(x))
+    p = replace(p, frequency_sd_hz=0.05 * p.frequency_hz)
     (mean, sd), (many, many_sd) = frf_moments(p, LINES), sampled(p)
     size = np.sqrt(np.mean(np.abs(many) ** 2, axis=-1, keepdims=True))
     off = np.abs(sd / many_sd - 1)

@@ -86,11 +86,11 @@ def bent(x):
 
 
 def test_ar1_nargp_follows_a_bent_relation_that_ar1_cannot():
-    x, below = np.random.default_rng(3).random((14, 1)), Exact(wave)
-    s, grid = Samples.of(x, bent(x)), np.linspace(0, 1, 101)[:, None]
+    x, below = np.random.default_rng(3).random((14, 2)), Exact(wave)
+    s, grid = Samples.of(x, bent(x)), np.random.default_rng(4).random((101, 2))
     off = [
         np.sqrt(np.mean((fit_averaged(s, *how).predict(grid)[0] - bent(grid)) ** 2))
-        for how in ((perdikaris(1), below, 0.7, True), ("matern52", below, 0.7))
+        for how in ((perdikaris(2), below, 0.7, True), ("matern52", below, 0.7))
     ]
     assert off[0] < 0.25 * off[1]
 
@@ -155,16 +155,3 @@ def test_the_level_below_is_integrated_over():
     np.testing.assert_allclose(mean, each.mean(axis=1), atol=0.01)
     total = np.sqrt(np.mean(spread**2, axis=1) + np.var(each, axis=1))
     np.testing.assert_allclose(sd, total, rtol=0.02)
-
-
-def test_it_bends_where_a_line_cannot():
-    cheap, x = np.linspace(0, 1, 50)[:, None], np.linspace(0, 1, 14)[:, None]
-    low = fit_likelihood(Samples.of(cheap, wave(cheap)), noise=1e-3)
-    model = fit_nargp(Samples.of(x, bent(x)), low, low.units, noise=1e-3)
-    grid = np.linspace(0, 1, 101)[:, None]
-    mean, sd = model.predict(grid)
-    alone = fit_likelihood(Samples.of(x, bent(x)), noise=1e-3).predict(grid)[0]
-    off = np.sqrt(np.mean((mean - bent(grid)) ** 2))
-    assert off < 0.1 * np.sqrt(np.mean((alone - bent(grid)) ** 2))
-    assert off < 0.03
-    assert np.all(sd >= 0)
