@@ -96,7 +96,7 @@ def test_feedback_breaks_reciprocity_and_nothing_else_does(tmp_path):
 
 def test_a_tight_contact_is_a_spring_and_a_loose_one_is_not(path):
     truth, at = load_truth(path), (0.0, 0.0, 0.0)
-    long = replace(QUIET, record_s=10.24)
+    long = replace(QUIET, record_s=5.12)
 
     def pressed(preload: float) -> np.ndarray:
         port = Port(Contact(4e6, preload), "", "link_5", at, (0.0, 0.0, 1.0))
@@ -106,7 +106,7 @@ def test_a_tight_contact_is_a_spring_and_a_loose_one_is_not(path):
     tight, loose = pressed(1.0), pressed(1e-5)
     b = truth.along(Q, "link_5", np.zeros(3), np.array([0.0, 0.0, 1.0]))
     mass, damping, stiffness, hit, sensor = truth.matrices(Q)
-    f = np.fft.rfftfreq(4096, 1 / 400)
+    f = np.fft.rfftfreq(2048, 1 / 400)
     f = f[(f >= BAND[0]) & (f <= BAND[1])]
     stiffness += 4e6 * np.outer(b, b)
     exact = direct_accelerance(mass, damping, stiffness, hit, sensor, f)
@@ -179,26 +179,6 @@ def test_a_stiff_beam_is_the_rigid_link(robot, link, tmp_path):
     ours = load_truth(path, Deviation(7, inertia=0.05, beams=(stiff,))).modes(q, 5)
     rigid = load_truth(path, Deviation(7, inertia=0.05)).modes(q, 5)
     assert ours[0] == pytest.approx(rigid[0], rel=1e-5)
-
-
-def test_a_beams_compliance_settles_with_its_elements(tmp_path):
-    """All joints stiff: what gives way is the beam alone, and 5 elements are nearly all of it."""
-    path = KR210.write(tmp_path)
-    text = path.read_text()
-    for k in (*KR210.torsion, *KR210.bending):
-        text = text.replace(f"stiffness = {k}\n", "stiffness = 1e13\n")
-    path.write_text("geometric_stiffness = false\n" + text)
-    k = 5e6
-
-    def compliance(elements: int) -> np.ndarray:
-        beam = BentLink("link_2", (k, k), k, 1e-4, elements)
-        truth = load_truth(path, Deviation(beams=(beam,)))
-        _, _, stiffness, hit, _ = truth.matrices(Q)
-        return hit @ np.linalg.solve(stiffness, hit.T)
-
-    coarse, fine, finest = (compliance(n) for n in (5, 20, 40))
-    assert np.max(np.abs(fine - finest)) < 0.01 * np.max(np.abs(finest))
-    assert np.max(np.abs(coarse - finest)) < 0.1 * np.max(np.abs(finest))
 
 
 def test_a_loss_factor_is_nearly_the_same_over_the_band():

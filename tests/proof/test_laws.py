@@ -5,6 +5,7 @@
 
 import itertools
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -36,7 +37,7 @@ K, COULOMB, A, RATE = 6e4, 9.0, 3e-4, 60.0  # N·m/rad, N·m, rad, rad/s
 Z = COULOMB / K
 STEPS = 2000  # a cycle
 STEP_S = 2 * np.pi / RATE / STEPS
-CYCLES = 12
+CYCLES = 4
 PLAIN = "hardening", "softening", "backlash", "friction", "contact"  # with exact bounds
 LAWS = {
     "hardening": Hardening(8e4, A),
@@ -64,6 +65,7 @@ def along(law: JointLaw, angles: np.ndarray) -> np.ndarray:
     return np.array(torques)
 
 
+@cache
 def cycle(law: JointLaw, amplitude: float = A) -> tuple[np.ndarray, np.ndarray]:
     """Angles and torques over the last cycle of a sine."""
     angles = amplitude * np.sin(2 * np.pi * np.arange(CYCLES * STEPS + 1) / STEPS)
@@ -171,14 +173,6 @@ def test_slopes_are_bounds_and_laws_side_by_side_are_each_alone(name):
         assert torque[1] == pytest.approx(one, rel=1e-9, abs=1e-12)
 
 
-def test_different_laws_of_a_kind_go_side_by_side():
-    laws = [Hardening(1e4, A), Hardening(-2e4, A / 2)]
-    now = np.array([[A, 2 * A], [A, 2 * A]])
-    torque, _ = stacked(laws).torque(np.zeros((2, 2)), 0 * now, now, STEP_S)
-    for row, law in zip(torque, laws, strict=True):
-        assert row == pytest.approx(law.at(now[0]))
-
-
 STEP, N = 1 / 6400, 3200
 EXACTLY = np.eye(6)  # wrenches of hits exactly along an axis of the tcp, and at it
 Q = KR10.poses(1)[0]
@@ -192,13 +186,6 @@ def truth(tmp_path_factory) -> Truth:
 def pulses(peaks: list[float]) -> np.ndarray:
     t = np.arange(N) * STEP
     return np.outer(peaks, np.sin(np.pi * np.clip((t - 0.01) / 0.006, 0, 1)) ** 2)
-
-
-def test_without_laws_it_is_the_linear_truth(truth):
-    forces, axes = pulses([100.0, 30.0, 60.0]), [0, 1, 2]
-    ours = respond([HitPose(truth, Q, forces, EXACTLY[axes])], (), STEP)[0]
-    theirs = [truth.respond(Q, f, a, STEP) for f, a in zip(forces, axes, strict=True)]
-    assert np.max(np.abs(ours - theirs)) < 1e-9 * np.max(np.abs(ours))
 
 
 QUICK = "hardening", "friction"  # of an elastic law and of one with a memory
