@@ -14,7 +14,6 @@ from planner.design.acquisitions import (
     mixed,
     mutual_information,
     parameter_reduction,
-    reduction,
     repeat_gain,
     share_left,
     stability,
@@ -101,16 +100,6 @@ def test_more_axes_tell_more(surrogate):
         for j, b in enumerate(SUBSETS):
             if set(a) < set(b):
                 assert gain[i] < gain[j]
-
-
-def test_mixed_and_goal_add_up(surrogate):
-    outputs, poses = with_parameters(surrogate, X)
-    target = outputs.workspace
-    both = reduction(outputs, poses, target) + parameter_reduction(outputs, poses, target)
-    np.testing.assert_allclose(mixed(outputs, poses), both)
-    np.testing.assert_allclose(goal(outputs, poses), both)
-    plain, flat = over(surrogate, X, 20)
-    np.testing.assert_allclose(mixed(plain, flat), ACQUISITIONS["integrated_variance"](plain, flat))
 
 
 def test_a_goal_draws_the_proposal_to_itself(surrogate):

@@ -98,15 +98,6 @@ def test_inertias_against_finite_differences(tmp_path):
         assert np.abs(found - expected).max() < 1e-6 * max(np.abs(h).max(), np.abs(found).max())
 
 
-def test_changed_inertia_is_the_linear_change(tmp_path):
-    simulation, matrices, inertias, _ = everything(tmp_path, 0.0, 0.0)
-    change = 0.05 * np.random.default_rng(1).standard_normal((6, 10)) * simulation.elastic.inertia
-    other = simulation.changed(simulation.elasticity, change)
-    mass = other.elastic.matrices(KR10.poses(3)).mass
-    expected = matrices.mass + mass_change(inertias, change.ravel())
-    np.testing.assert_allclose(mass, expected, atol=1e-12 * np.abs(mass).max())
-
-
 def test_window_shifts_the_laplace_variable(tmp_path):
     """H at iω + rate is the transform of e^(−rate·t) h(t): checked through the poles."""
     simulation, matrices, _, s = everything(tmp_path, 0.0, 7.0)

@@ -206,15 +206,6 @@ def test_amplification_is_the_growth_of_errors(assembled):
     assert np.max(np.abs(ratio - 1)) < 0.7
 
 
-def test_taking_off_undoes_putting_on():
-    rng = np.random.default_rng(0)
-    half = rng.standard_normal((6, 6, 5)) * 1e-7
-    holder = TipReceptance.known(np.linspace(10, 900, 5), half + np.swapaxes(half, 0, 1))
-    on = couple(holder, PUT_ON)
-    back = couple(TipReceptance.known(on.frequency_hz, on.receptance), None, PUT_ON)
-    assert back.receptance == pytest.approx(np.moveaxis(holder.receptance, 0, -1), rel=1e-8)
-
-
 @pytest.mark.parametrize("axis", [(0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.6, 0.0, 0.8)])
 def test_a_tool_along_any_axis(axis):
     """Turning robot and tool together turns the answer."""

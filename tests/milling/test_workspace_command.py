@@ -75,6 +75,7 @@ def test_map_of_the_workspace(cell, tmp_path):
     files = ("--plot", tmp_path, "--rrd", tmp_path / "map.rrd")
     said = asked(cell, "--map", "--poses", 4, "--point", "6000,0.0002", *files)
     assert said["spindle_rpm"] == 6000
+    assert not any("beyond the tip" in text for text in said["remarks"])
     found, robust = (np.array(said[n], float) for n in ("depth_limit_m", "depth_limit_m_at_95"))
     assert found.shape == (4,)
     assert np.all(robust <= found * 1.05)
@@ -154,12 +155,9 @@ def test_tip_and_sensor_may_be_points_of_robot_toml(cell, tmp_path):
 
 
 def test_a_spindle_beyond_the_tip_is_remarked_upon(cell, tmp_path):
-    remarks = []
-    for z in (1.0, -1.0):
-        (tmp_path / "cut.toml").write_text(cut_toml(**CUT | {"axis": (0.0, 0.0, z)}))
-        said = asked(cell, "--cut", tmp_path / "cut.toml", "--map", "--poses", 2)
-        remarks.append(any("beyond the tip" in text for text in said["remarks"]))
-    assert sorted(remarks) == [False, True]
+    (tmp_path / "cut.toml").write_text(cut_toml(**CUT | {"axis": (0.0, 0.0, 1.0)}))
+    said = asked(cell, "--cut", tmp_path / "cut.toml", "--map", "--poses", 2)
+    assert any("beyond the tip" in text for text in said["remarks"])
 
 
 @pytest.mark.slow

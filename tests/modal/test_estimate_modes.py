@@ -79,7 +79,7 @@ def test_exponential_window_is_corrected_exactly(rate, columns):
 def test_intervals_cover_the_truth(known):
     """95 % intervals of frequency, damping and residues, 1-5 % noise, variance told or not."""
     of_poles, of_residues, wrong = [], [], np.zeros(2)
-    for seed in range(30):
+    for seed in range(20):
         rng = np.random.default_rng(100 + seed)
         system = random_system(rng, int(rng.integers(2, 7)), complexity=0.2)
         h, variance = noisy(exact_frf(system, LINES), rng.uniform(0.01, 0.05), rng)
@@ -140,7 +140,7 @@ def test_scatter_between_lines_unlike_the_stated_variance_enlarges_the_sd():
 
 def test_sds_do_not_hang_on_the_band():
     """Lines cut off to check the model may be all that hold a mode near the band's edge."""
-    for seed in range(4):
+    for seed in range(2):
         rng = np.random.default_rng(seed)
         system = random_system(rng, 5, (8.0, 60.0), damping=(0.01, 0.04))
         h, variance = noisy(exact_frf(system, LINES), 0.003, rng)
@@ -188,7 +188,7 @@ def test_hit_directions_that_disagree_do_not_split_a_mode():
 def test_ripple_makes_no_likely_modes():
     """A 3 % ripple over the FRFs (cable, double hit) that no modal model explains."""
     likely = 0
-    for seed in range(5):
+    for seed in range(3):
         rng = np.random.default_rng(80 + seed)
         system = random_system(rng, 4, damping=(0.005, 0.03))
         h, variance = noisy(exact_frf(system, LINES), 0.005, rng)
@@ -196,7 +196,7 @@ def test_ripple_makes_no_likely_modes():
         model = estimate_modes(as_frf(LINES, h * ripple, variance), BAND)
         assert None not in matched(model.modes, system)
         likely += sum(m.probability > 0.5 for m in model.modes) - 4
-    assert likely <= 2
+    assert likely <= 1
 
 
 def test_noise_alone_is_refused():

@@ -284,13 +284,11 @@ def test_a_follower_in_the_wrist_is_solved_for(factor, tmp_path):
         assert not Collisions(robot).limits(found.q)
 
 
-@pytest.mark.parametrize("begun_by", ["--robot", "--urdf"])
-def test_followers_are_no_columns_from_check_to_a_proposal(begun_by, tmp_path):
+def test_followers_are_no_columns_from_check_to_a_proposal(tmp_path):
     robot = balanced(tmp_path / "robot")
     plan = tmp_path / "campaign.toml"
     plan.write_text(campaign_text(3).replace("candidates = 200", "candidates = 40"))
     said("check", robot, "--campaign", plan)
-    urdf = robot.with_name("arm.urdf")
-    own = ["--robot", robot] if begun_by == "--robot" else ["--urdf", urdf, "--mass-kg", 55]
-    said("new", tmp_path / "cell", *own, "--campaign", plan)
+    said("new", tmp_path / "guessed", "--urdf", robot.with_name("arm.urdf"), "--mass-kg", 55)
+    said("new", tmp_path / "cell", "--robot", robot, "--campaign", plan)
     assert len(told("next", tmp_path / "cell")["proposals"][0]["joints_deg"]) == 6

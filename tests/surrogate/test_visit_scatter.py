@@ -114,16 +114,6 @@ def test_a_pose_visited_again_tells_the_scatter():
     assert loud.max() < 2.0
 
 
-def test_modes_learn_the_scatter_from_one_another():
-    case = visited(1, "offset", 8, 0.0, 1)
-    one = np.arange(MODES) == 0
-    hz = np.where(one[None, :] & (np.arange(8) > 1)[:, None], np.nan, case.seen.frequency_hz)
-    with_others = fit_primary(replace(case.seen, frequency_hz=hz))
-    low = np.log(case.seen.simulated.frequency_hz[:, :1])
-    alone = fit_primary(observations(case.seen.x, np.log(hz[:, :1]), low))
-    assert scatter_percent(with_others)[0] < 0.7 * scatter_percent(alone)[0]
-
-
 def test_what_outputs_share_is_learned_from_all_of_them():
     # Three outputs say that the second coordinate is 2 ± 0.3, the fourth nothing at all.
     def score(z):
