@@ -1,6 +1,4 @@
-"""500 of each fault that a hand or a chain makes, on MuJoCo's robots: found, and good hits kept.
-
-Hits on true robots with all that a cell adds, and each fault that a hand or a chain makes.
+"""Each fault that a hand or a chain makes, on MuJoCo's robots: found, and good hits are kept.
 
 Nothing is shared with what screens them: the robots are MuJoCo's, numbers are drawn anew for each
 group. A group is what is hit along one axis at one pose; of it one hit has the fault.
@@ -219,24 +217,15 @@ def tried(folder: Path, count: int, seed: int) -> tuple[Counter[str], Counter[st
     return found, lost, good
 
 
-def test_faults_are_found_and_good_hits_are_kept(tmp_path):
-    found, lost, _ = tried(tmp_path, 4, seed=1)
-    assert lost[""] == 0
-    assert {name: found[name] for name in FAULTS if found[name] < 3} == {}
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(3600)
-def test_500_of_each_fault(tmp_path):
-    count = 500
+@pytest.mark.parametrize(
+    "count", [4, pytest.param(500, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])]
+)
+def test_faults_are_found_and_good_hits_are_kept(tmp_path, count):
     found, lost, good = tried(tmp_path, count, seed=4)
-    lines = [f"good hits refused {lost['']} of {good}"]
-    lines += [
-        f"{name}: found {found[name]} of {count}; good ones beside it refused {lost[name]} of "
-        f"{good - count}"
-        for name in FAULTS
-    ]
-    print("\n" + "\n".join(lines))
-    assert all(found[name] >= FOUND * count for name in FAULTS)
+    print(f"\ngood hits refused {lost['']} of {good}")
+    for name in FAULTS:
+        print(f"{name}: found {found[name]} of {count}; good ones beside it refused {lost[name]}")
+    least = FOUND if count == 500 else 0.75  # of few the share scatters
+    assert {name: found[name] for name in FAULTS if found[name] < least * count} == {}
     assert lost[""] <= REFUSED * good
     assert all(lost[name] <= REFUSED * (good - count) for name in FAULTS)

@@ -46,19 +46,6 @@ def fit(request):
     return MODELS[request.param]
 
 
-def test_any_number_of_points_duplicates_constants_and_gaps_work(fit):
-    s = samples(4)
-    doubled = Samples.of(np.vstack([s.x, s.x]), np.r_[s.y, s.y + 0.01], 0.01)
-    constant = Samples.of(s.x, np.full(4, 3.0))
-    holed = Samples.of(s.x, np.where(np.arange(4) == 1, np.nan, s.y), s.sd)
-    assert len(holed.y) == 3
-    for given in (samples(1), samples(2), samples(9), doubled, constant, holed):
-        mean, sd = fit(given).predict(GRID)
-        assert mean.shape == sd.shape == (40,)
-        assert np.isfinite(mean).all()
-        assert (sd > 0).all()
-
-
 def test_a_noisy_point_pulls_less(fit):
     s = samples(8)
     off = s.y + np.where(np.arange(8) == 3, 1.0, 0.0)
