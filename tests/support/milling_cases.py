@@ -8,7 +8,7 @@ import numpy as np
 
 from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes, real_modes
-from planner.milling.machine import Machine, semi_monodromies, semi_monodromy
+from planner.milling.machine import Machine, semi_monodromies
 
 # Insperger and Stépán's mode, as Ding et al. (2010) use it.
 HERTZ, ZETA, KILOGRAM = 922.0, 0.011, 0.03993
@@ -75,10 +75,7 @@ def two_each_way() -> CutterModes:
     return real_modes(hertz, zeta, stiffness / (2 * np.pi * hertz) ** 2, along)
 
 
-def semi_growth(machine: Machine, rpm: float, depth: float, count: int | None = None) -> float:
-    """Largest |µ| at a speed and a depth in m, with `count` steps of a tooth's period."""
-    if count is None:
-        (built,) = semi_monodromies(machine, rpm, 2.0)(np.array([depth]))
-    else:
-        built = semi_monodromy(machine, rpm, count, depth)
+def semi_growth(machine: Machine, rpm: float, depth: float) -> float:
+    """Largest |µ| at a speed and a depth in m, by semi-discretisation."""
+    (built,) = semi_monodromies(machine, rpm, 2.0)(np.array([depth]))
     return float(np.max(np.abs(np.linalg.eigvals(built))))
