@@ -33,6 +33,8 @@ WRONG = {
     "speeds in degrees": (URDF, r'velocity="1.920"', 'velocity="110"', "warning", "turns a second"),
     "no collision geometry": (URDF, r"<collision><origin.*?</collision>", "", "warning",
                               "collision"),
+    "a link without shape": (URDF, r'<collision><origin xyz="0.2 0 0" rpy=.*?</collision>', "",
+                             "warning", "joint_4 turns has no collision shape"),
     "sensor askew": (URDF, r'xyz="0.26 0 0.065" rpy="0 1.570796 0"',
                      'xyz="0.26 0 0.065" rpy="0 0 0"', "warning", "turned by 90"),
     "sensor on another link": (ROBOT, r'sensor_frame = "sensor"', 'sensor_frame = "link_3"',

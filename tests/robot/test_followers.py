@@ -289,6 +289,7 @@ def test_followers_are_no_columns_from_check_to_a_proposal(tmp_path):
     plan = tmp_path / "campaign.toml"
     plan.write_text(campaign_text(3).replace("candidates = 200", "candidates = 40"))
     said("check", robot, "--campaign", plan)
-    said("new", tmp_path / "guessed", "--urdf", robot.with_name("arm.urdf"), "--mass-kg", 55)
-    said("new", tmp_path / "cell", "--robot", robot, "--campaign", plan)
+    said("new", tmp_path / "stated", "--robot", robot, "--campaign", plan)
+    own = "--urdf", robot.with_name("arm.urdf"), "--mass-kg", 55, "--campaign", plan
+    said("new", tmp_path / "cell", *own)
     assert len(told("next", tmp_path / "cell")["proposals"][0]["joints_deg"]) == 6
