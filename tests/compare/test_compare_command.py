@@ -54,7 +54,7 @@ def command(pool, out: Path, *more: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def first(pool, out):
-    return told(*command(pool, out, "--rrd", str(out / "curves.rrd"), "--workers", "2"))
+    return told(*command(pool, out, "--rrd", str(out / "curves.rrd")))
 
 
 def test_the_answer_has_every_documented_key(first):
