@@ -1,4 +1,7 @@
-"""10,000 proposals on four robots, checked by MuJoCo: limits, collisions, place."""
+"""10,000 proposals on four robots, checked by MuJoCo: limits, collisions, place; and none missed.
+
+`pytest -m slow -s tests/design/test_proposals_hold.py` prints the counts.
+"""
 
 import msgspec
 import numpy as np
@@ -7,11 +10,14 @@ import pytest
 from planner.campaign.cell import Cell
 from planner.campaign.config import CampaignConfig
 from planner.proof.arms import IRB6640, KR10, KR210
+from planner.proof.inverse import joint_angles, tool_rotation
+from planner.proof.load import load_truth
 from planner.robot.collision import Collisions
-from tests.support.robots import make_arm
+from planner.robot.inverse_kinematics import solve
+from tests.support.robots import JOINTS_DEG, make_arm
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1500)]
-PROPOSALS = 2500
+PROPOSALS, TARGETS, POINTS = 2500, 250, 60
 DOWN = [0.0, 0.0, -1.0]
 ROBOTS = {
     "KR10": (KR10.write, {"joints_deg": [list(r) for r in KR10.joints_deg]}),
@@ -100,7 +106,7 @@ def cell_of(name, directory):
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_no_proposal_violates_anything(name, tmp_path):
+def test_no_proposal_violates_anything_and_few_are_missed(name, tmp_path):
     cell = cell_of(name, tmp_path)
     judge, candidates = Independent(cell), cell.candidates
     broken = [i for i, q in enumerate(candidates.q) if not judge.within(q)]
@@ -109,7 +115,23 @@ def test_no_proposal_violates_anything(name, tmp_path):
         if judge.contacts(q):
             touching.append(i)
         off.append(np.linalg.norm(judge.position() - candidates.position_m[i]))
-    rng, collisions = np.random.default_rng(7), Collisions(cell.robot)
+    # Targets that MuJoCo says can be reached: any pose within limits that touches nothing.
+    rng, found, asked = np.random.default_rng(7), 0, 0
+    collisions = Collisions(cell.robot)
+    low, high = np.deg2rad(np.array(JOINTS_DEG)).T if name == "small arm" else (
+        cell.robot.lower_rad, cell.robot.upper_rad
+    )  # fmt: skip
+    while asked < TARGETS:
+        q = rng.uniform(low, high)
+        if judge.contacts(q):
+            continue
+        rotation, position = cell.robot.forward(q)
+        asked += 1
+        found += solve(cell.robot, rotation, position, None, collisions, seed=asked).q is not None
+    if cell.workspace.tool_axis is not None:
+        accepted = len(candidates.q) / (len(candidates.q) + sum(candidates.rejected.values()))
+        share = reachable_share(cell, judge)
+        assert accepted >= 0.95 * share - 0.05  # of POINTS points the share is known to ± 0.05
     wide = [rng.uniform(cell.robot.lower_rad, cell.robot.upper_rad) for _ in range(100)]
     struck = [bool(judge.contacts(q)) for q in wide]
     ours = [not collisions.free(q) for q in wide]
@@ -118,3 +140,21 @@ def test_no_proposal_violates_anything(name, tmp_path):
     assert not broken
     assert not touching
     assert max(off) < 1e-9
+    assert found >= 0.95 * asked
+
+
+def reachable_share(cell: Cell, judge: Independent) -> float:
+    """Share of the workspace that MuJoCo's kinematics reach without contact, from many starts."""
+    truth = load_truth(cell.robot.path)
+    rng, reached = np.random.default_rng(11), 0
+    space = cell.workspace
+    for _ in range(POINTS):
+        x, y, z, angle = rng.uniform(space.lower, space.upper)
+        rotation = tool_rotation(space.tool_axis, angle)
+        for _ in range(12):
+            start = rng.uniform(truth.lower_rad, truth.upper_rad)
+            q = joint_angles(truth, rotation, np.array([x, y, z]), start)
+            if q is not None and not judge.contacts(q):
+                reached += 1
+                break
+    return reached / POINTS

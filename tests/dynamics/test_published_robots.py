@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 from planner.campaign.config import load_campaign_config
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
+from planner.frf.metrics import agreement, complex_frac
+from planner.proof.load import load_truth
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
 
@@ -46,6 +48,21 @@ def test_every_robot_can_be_simulated_all_over_its_campaign(folder, name):
     modes = Simulation(robot).modes(poses, 3)
     assert np.all((modes.frequency_hz > 5) & (modes.frequency_hz < 100))
     assert np.all((modes.damping_ratio > 0.001) & (modes.damping_ratio < 0.2))
+
+
+@pytest.mark.parametrize(("folder", "name"), ROBOTS)
+def test_another_engine_reads_the_same_robot(folder, name):
+    robot = load(folder, name)
+    truth = load_truth(robot.path)
+    low, high = np.deg2rad(
+        load_campaign_config(shipped("kr10_birk2025") / "campaign.toml").workspace.joints_deg
+    ).T
+    poses = np.random.default_rng(0).uniform(low, high, (3, 6))
+    lines = np.linspace(*robot.config.band_hz, 300)
+    ours = Simulation(robot).accelerance(poses, lines)
+    theirs = np.array([truth.accelerance(q, lines) for q in poses])
+    assert complex_frac(theirs, ours).min() > 1 - 1e-9
+    assert agreement(theirs, ours).frobenius.min() > 1 - 1e-6
 
 
 @pytest.mark.parametrize(("folder", "name"), [*ROBOTS[:3], ("kr240_plane", "robot")])

@@ -1,4 +1,4 @@
-"""FRFs of hits against the exact FRF and their own variance; unequal hits weighted.
+"""FRFs of hits against the exact FRF, their own variance and pyFRF; unequal hits weighted.
 
 FRFs of files are used only with units, one grid and directions; conversions of quantities.
 """
@@ -18,7 +18,7 @@ from planner.frf.synthesis import DERIVATIVE, convert
 from planner.milling import cutter_frf, tip_files
 from planner.milling.tool import Point, Tool
 from planner.recording.records import End, FrfRecord, Hit
-from tests.support.simulated_hits import exact_accelerance, make_hit
+from tests.support.simulated_hits import RATE_HZ, exact_accelerance, make_hit
 
 BAND = (4.0, 60.0)
 
@@ -73,6 +73,33 @@ def test_variance_of_a_hit_holds_where_the_floor_rumbles(rumble):
     low, high = np.mean(ratios, axis=0)
     assert 0.4 < low < 2.5
     assert 0.5 < high < 2.0
+
+
+def test_pyfrf_agrees():
+    from pyFRF import FRF
+
+    rng = np.random.default_rng(2)
+    hits = hits_of(rng, 0.03, 4, ("+x",), record_s=4.0)
+    n = min(h.force_n.size for h in hits)
+    peer = FRF(sampling_freq=int(RATE_HZ), exc=np.array([h.force_n[None, :n] for h in hits]),
+               resp=np.array([h.acceleration_m_s2[:, :n] for h in hits]), exc_type="f",
+               resp_type="a", window="none")  # fmt: skip
+    frequency = peer.get_f_axis()
+    theirs = peer.get_H1()[:, 0] * (2j * np.pi * frequency) ** 2  # it gives receptance
+    ours = estimate(hits, BAND)
+    inside = (ours.frequency_hz > 5) & (ours.frequency_hz < 58)
+    at = np.abs(np.interp(ours.frequency_hz[inside], frequency, np.abs(theirs[0])))
+    mine = np.abs(ours.accelerance[0, 0, inside])
+    # The peer keeps the force's noise between pulses; beside resonances it shows.
+    assert np.median(np.abs(at - mine)) < 0.02 * mine.max()
+    # Which of the two is nearer to the truth?
+    exact = exact_accelerance(ours.frequency_hz[inside])[0, 0]
+    own = np.linalg.norm(ours.accelerance[0, 0, inside] - exact)
+    other = np.linalg.norm(
+        np.interp(ours.frequency_hz[inside], frequency, theirs[0].real)
+        + 1j * np.interp(ours.frequency_hz[inside], frequency, theirs[0].imag) - exact
+    )  # fmt: skip
+    assert own <= 1.1 * other
 
 
 def test_mixed_rates_are_refused():

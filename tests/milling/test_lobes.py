@@ -1,12 +1,19 @@
 """Limits of the literature's cuts, converged: stability is first lost at these depths.
 
-Lobes beside what knows nothing of them: closed form, another discretisation.
+Lobes beside what knows nothing of them: steps in time, closed form, other discretisations.
+
+Milling step by step in time: a check of the lobes that shares nothing with them but the modes.
+
+What is stepped is the deviation from the forced vibration, which every tooth repeats and which
+so leaves the chip as it is. Each tooth cuts down to where it is; it cuts nothing where it is above
+the surface that the teeth before it left, and the static force is then missing (loss of contact).
 """
 
 import numpy as np
 import pytest
 
 from planner.errors import InputError
+from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes
 from planner.milling.lobes import stability_limits
 from planner.milling.machine import Machine, limits, multiplier
@@ -23,6 +30,7 @@ from tests.support.milling_cases import (
 )
 
 CONVERGED, ZEROTH = 1e-3, 5e-3
+SLOW = pytest.mark.slow
 
 
 @pytest.mark.parametrize("depth_mm", MULTIPLIERS)
@@ -59,6 +67,70 @@ def test_zeroth_order_of_two_modes_each_way():
     depth, _ = limits(found, given.speeds_rpm, given.teeth)
     wanted = [1.086, 1.615, 1.139, 1.456, 0.958, 4.619, 1.040]
     np.testing.assert_allclose(1e3 * depth, wanted, rtol=ZEROTH)
+
+
+STEPS_PER_RADIAN = 12.0  # of the fastest mode
+DISTURBED = 1e-4  # of the feed per tooth: the deviation that is begun with
+LOST = 0.3  # of the feed per tooth: a deviation that has grown so far is chatter
+ROUNDING = 1e-10  # of the feed: a deviation below this has died out
+BAND = 0.03  # about the limit, within which a simulation of finite length need not tell
+
+
+def dies_out(
+    modes: CutterModes, cut: Cut, rpm: np.ndarray, depth_m: np.ndarray, passes: int = 150
+) -> np.ndarray:
+    """(p,) bool at points of speed and depth; modes in the plane of the cut, equal teeth."""
+    fastest = float(np.max(np.abs(modes.poles))) * 60 / (float(np.min(rpm)) * cut.teeth)
+    count = int(max(90, np.ceil(STEPS_PER_RADIAN * fastest)))  # steps of a tooth's period
+    step = 60 / (rpm * cut.teeth * count)
+    half, whole = (np.exp(modes.poles * step[:, None] * share) for share in (0.5, 1.0))
+    phi = 2 * np.pi / cut.teeth * (np.arange(cut.teeth)[:, None] + (np.arange(count) + 0.5) / count)
+    inside = (phi >= cut.immersion_rad[0]) & (phi <= cut.immersion_rad[1])
+    normal = np.stack([np.sin(phi), np.cos(phi)], axis=-1)  # (teeth, count, 2)
+    along = np.stack([-np.cos(phi), np.sin(phi)], axis=-1)
+    push = cut.kt_n_m2 * along - cut.kr_n_m2 * normal
+    begun = np.random.default_rng(0).standard_normal((len(modes.poles), 2)) @ [1, 1j]
+    z = np.tile(DISTURBED * begun / np.abs(2 * modes.shapes).max(axis=1), (len(rpm), 1))
+    surface = np.tile(-np.sin(phi)[..., None], len(rpm))  # one feed before the first pass
+    force, peak = np.zeros((len(rpm), 2)), np.zeros((passes, len(rpm)))
+    for passed, i in np.ndindex(passes, count):
+        drive = force @ modes.drives.T / modes.poles
+        u = ((z * half + drive * (half - 1)) @ (2 * modes.shapes)).real
+        force = np.zeros_like(force)
+        for j in np.flatnonzero(inside[:, i]):
+            at = np.sin(phi[j, i]) * passed + u @ normal[j, i]
+            chip = np.maximum(at - surface[j, i], 0.0)
+            surface[j, i] = np.maximum(surface[j, i], at)
+            force += (depth_m * (chip - np.sin(phi[j, i])))[:, None] * push[j, i]
+        z = z * whole + force @ modes.drives.T / modes.poles * (whole - 1)
+        peak[passed] = np.maximum(peak[passed], np.abs(u).max(axis=1))
+    early, late = (part.max(axis=0) for part in np.array_split(peak[passes // 2 :], 2))
+    return ((late < early) | (late < ROUNDING)) & (peak.max(axis=0) < LOST)
+
+
+@pytest.mark.parametrize(
+    ("modes", "given", "points"),
+    [
+        (one_mode(), cut(), 8),
+        (two_each_way(), cut(milling="down", radial_immersion=0.5, teeth=3), 8),
+        pytest.param(one_mode(), cut(milling="up", radial_immersion=0.05), 60, marks=SLOW),
+        pytest.param(
+            two_equal(), cut(milling="down", radial_immersion=0.3, teeth=4), 60, marks=SLOW
+        ),
+    ],
+)
+def test_steps_in_time_say_the_same(modes: CutterModes, given: Cut, points: int):
+    asked, random = Machine(modes, given), np.random.default_rng(3)
+    rpm = random.uniform(8000, 20000, points)
+    depth = asked.floor().floor_m * random.uniform(0.5, 3, points)
+    each = list(zip(rpm, depth, strict=True))
+    below, said, above = (
+        np.array([multiplier(asked, s, share * b)[0] < 1 for s, b in each])
+        for share in (1 - BAND, 1.0, 1 + BAND)
+    )
+    with np.errstate(all="ignore"):
+        alike = (dies_out(modes, given, rpm, depth) == said)[below == above]
+    assert np.mean(alike) >= (1 if points < 60 else 0.99)
 
 
 def test_one_degree_of_freedom_in_closed_form():

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.errors import InputError
-from planner.milling.beam import Segment, ToolMaterial, transfer
+from planner.milling.beam import Section, Segment, ToolMaterial, transfer
 from planner.milling.tool import load_tool
 
 GOOD = """
@@ -127,6 +127,29 @@ def free_free(segments, omega):
     tip_base = -np.linalg.inv(fu)
     tip_tip = tip_base @ ff
     return np.block([[tip_tip, tip_base], [uu @ tip_tip + uf, uu @ tip_base]])
+
+
+def roots(value, omega):
+    """Where a real function over omega changes its sign, by linear interpolation."""
+    k = np.flatnonzero(np.diff(np.sign(value)))
+    return omega[k] - value[k] * np.diff(omega)[k] / np.diff(value)[k]
+
+
+@pytest.mark.parametrize("thick", [0.02, 0.1, 0.25])
+def test_simply_supported_rod_has_timoshenkos_frequencies(thick):
+    """Closed: (1 + …)ω² of Timoshenko's equation with sines (Weaver et al. 1990, 5.12)."""
+    length = 0.1
+    s, m = Section(thick * length, 0.0, STEEL), STEEL
+    k = np.pi * 2 / length
+    r2 = s.second_moment / s.area
+    e, g = m.youngs_modulus_pa, s.shear_coefficient * m.youngs_modulus_pa / 2.6
+    rho = m.density_kg_m3
+    a, b, c = rho * r2 / g, -(1 + r2 * k**2 * (1 + e / g)), e * r2 * k**4 / rho
+    expected = np.sqrt((-b - np.sqrt(b * b - 4 * a * c)) / (2 * a))
+    omega = expected * np.linspace(0.9951, 1.005, 41)  # no line on the root itself
+    t = transfer([rod(length, thick * length)], omega)
+    supported = t[:, [0, 10]][:, :, [4, 6]]  # no motion, no moment at both ends
+    assert roots(np.linalg.det(supported).real, omega) == pytest.approx([expected], rel=1e-6)
 
 
 def test_far_below_its_modes_a_beam_moves_as_a_rigid_body():

@@ -181,6 +181,26 @@ def test_a_stiff_beam_is_the_rigid_link(robot, link, tmp_path):
     assert ours[0] == pytest.approx(rigid[0], rel=1e-5)
 
 
+def test_a_beams_compliance_settles_with_its_elements(tmp_path):
+    """All joints stiff: what gives way is the beam alone, and 5 elements are nearly all of it."""
+    path = KR210.write(tmp_path)
+    text = path.read_text()
+    for k in (*KR210.torsion, *KR210.bending):
+        text = text.replace(f"stiffness = {k}\n", "stiffness = 1e13\n")
+    path.write_text("geometric_stiffness = false\n" + text)
+    k = 5e6
+
+    def compliance(elements: int) -> np.ndarray:
+        beam = BentLink("link_2", (k, k), k, 1e-4, elements)
+        truth = load_truth(path, Deviation(beams=(beam,)))
+        _, _, stiffness, hit, _ = truth.matrices(Q)
+        return hit @ np.linalg.solve(stiffness, hit.T)
+
+    coarse, fine, finest = (compliance(n) for n in (5, 20, 40))
+    assert np.max(np.abs(fine - finest)) < 0.01 * np.max(np.abs(finest))
+    assert np.max(np.abs(coarse - finest)) < 0.1 * np.max(np.abs(finest))
+
+
 def test_a_loss_factor_is_nearly_the_same_over_the_band():
     spring = Spring("j", (0.0, 0.0, 1.0), 1e6, 0.0, loss=0.05)
     low, high = LOSS_BAND_HZ

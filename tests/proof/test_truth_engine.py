@@ -199,6 +199,17 @@ def test_both_engines_are_one_robot_whatever_it_lacks(tmp_path, name):
     same(one.loaded("spindle", 1.4), other.loaded("spindle", 1.4), scene.poses[1])
 
 
+def test_both_engines_split_a_link_and_shift_a_base_alike(tmp_path):
+    path = ARMS["kr10"].write(tmp_path, 3)
+    springs = (
+        Spring("link_2", (0.0, 0.0, 1.0), 1e5, 10.0),
+        Spring("base", (0.0, 1.0, 0.0), 1e7, 1.0, slide=True),
+    )
+    both = (load_truth(path, Deviation(7, inertia=0.05, extra=springs), e)
+            for e in ("mujoco", "tree"))  # fmt: skip
+    same(*both, ARMS["kr10"].poses(1)[0])
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_robots_drawn_at_random_stand_and_have_modes_in_the_band(tmp_path, seed):
     per_joint, rng = 1 + 2 * (seed % 2), np.random.default_rng(seed)
