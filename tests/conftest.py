@@ -1,6 +1,7 @@
 """What every test shares: one BLAS thread, real recordings where they are present."""
 
 import os
+import shutil
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
@@ -41,6 +42,21 @@ def first_pose_once(tmp_path_factory):
 def first_pose(first_pose_once, tmp_path):
     """A copy of it."""
     return first_pose_once.copied(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def two_poses_once(tmp_path_factory):
+    """A campaign of two poses whose simulation learns, and its true arm: not to be changed."""
+    from tests.support.plain_arm import measured_poses
+
+    return measured_poses(tmp_path_factory.mktemp("two"), 2)
+
+
+@pytest.fixture
+def two_poses(two_poses_once, tmp_path):
+    """A copy of it, and the arm."""
+    campaign, truth = two_poses_once
+    return type(campaign)(shutil.copytree(campaign.directory, tmp_path / "cell")), truth
 
 
 @pytest.fixture(scope="session")

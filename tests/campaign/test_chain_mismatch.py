@@ -1,27 +1,32 @@
-"""Wrong units, signs and axes are asked about at the first pose, good imports are not."""
+"""Wrong units, signs and axes, another gain or tool are asked about, good imports are not."""
 
 import json
+import re
+import shutil
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import cast
+from pathlib import Path
 
 import msgspec
 import numpy as np
 import pytest
 
+from planner.campaign.alternatives import OTHER_TOOL
 from planner.campaign.campaign import Campaign
 from planner.campaign.chain_faults import SCALED, TURNED, ChainFault
 from planner.campaign.import_checks import Claim, question_about
-from planner.campaign.state import CampaignState
+from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.frf.frf import Frf
 from planner.recording.folder import TABLE
 from planner.recording.records import Hit
-from tests.support.case_campaigns import lacking
+from tests.support import plain_arm
+from tests.support.case_campaigns import CaseCampaign, lacking
 from tests.support.chain_cases import FAULTS, SLIGHTEST, fault, judged, scaled, shown_by, sums_of
-from tests.support.outside import call
-from tests.support.shipped_campaign import RECORDINGS, shipped_campaign, shipped_pool
+from tests.support.fitted_cases import Case, everyday, one_thing
+from tests.support.outside import call, record
+from tests.support.plain_arm import measured_poses
+from tests.support.robots import BAND_HZ
 
 
 @pytest.mark.parametrize(("robot", "kind"), [("kr240 plane", "nothing"), ("kr10", "soft base")])
@@ -94,71 +99,118 @@ def test_every_fault_can_be_told_in_words():
 
 
 def test_the_commands_ask_about_units_and_take_the_answer(tmp_path):
-    campaign, pool = shipped_campaign(tmp_path), shipped_pool()
-    lines = (RECORDINGS / TABLE).read_text().splitlines()
-    names = [row.file.name for row in pool["A11"]]
-    own = [line for line in lines[1:] if any(line.endswith(name) for name in names)]
+    begun, truth = measured_poses(tmp_path, 0)
+    (proposal,), cell = begun.next(), begun.directory
+    pose, (a, *others) = proposal.pose, proposal.joints_deg
+    made = record(truth, tmp_path / "made", pose, [a, *others])
     for factor in ("1000", "9.81"):
-        (folder := tmp_path / f"times {factor}").mkdir()
-        paths = [scaled(row, folder, float(factor)) for row in pool["A11"]]
-        (folder / TABLE).write_text("\n".join([lines[0], *own]).replace("data/", "") + "\n")
-        code, out, err = call("import", campaign.directory, folder / TABLE, "--json")
+        folder = tmp_path / f"times {factor}"
+        paths = [scaled(path, folder / "data", float(factor)) for path in hits_in(made)]
+        shutil.copy(made / TABLE, folder)
+        code, out, err = call("import", cell, folder / TABLE, "--json")
         assert code == 3
         assert json.loads(out)["question"]["about"] == "chain"
         assert f"{factor} times too large: units or sensitivity" in err
-        assert f"planner undo {campaign.directory}" in err
-        assert f"planner confirm {campaign.directory} A11" in err
-        held = Campaign(campaign.directory)
-        assert len(held.state.held["A11"].hits) == len(paths)
+        assert f"planner undo {cell}" in err
+        assert f"planner confirm {cell} {pose}" in err
+        held = Campaign(cell)
+        assert len(held.state.held[pose].hits) == len(paths)
         if factor == "1000":
             held.undo()
-    held.confirm("A11")
-    assert [m.pose for m in held.state.used] == ["A11"]
+    held.confirm(pose)
+    assert [m.pose for m in held.state.used] == [pose]
     # Of a chain that the engineer called right the same is not asked again; another one is.
-    rows, band_hz = pool["A57"], held.cell.config.modes.band_hz
-    for factor, doubted in (("9.81", ""), ("1", "accelerations are 9.81 times too small")):
-        (folder := tmp_path / f"then times {factor}").mkdir()
-        sources = tuple(Source(scaled(r, folder, float(factor)), r.file.name, r.hit) for r in rows)
-        claim = Claim(held.model, held.state, "A57", rows[0].joints_deg)
-        asked = question_about(claim, measure(sources, band_hz))
+    there = a + 20, *others
+    files = hits_in(record(truth, tmp_path / "there", "X2", list(there)))
+    for factor, doubted in (("9.81", ""), ("1", "times too small: units or sensitivity")):
+        paths = [scaled(path, tmp_path / f"then times {factor}", float(factor)) for path in files]
+        measured = measure([Source(path, path.name) for path in paths], plain_arm.BAND_HZ)
+        asked = question_about(Claim(held.model, held.state, "X2", there), measured)
         assert (asked is not None and asked.about == "chain") == bool(doubted)
         assert doubted in (asked.text if asked else "")
 
 
-def test_a_window_that_nobody_stated_is_asked_about(tmp_path):
-    campaign, pool = shipped_campaign(tmp_path), shipped_pool()
-    rows, band_hz = pool["A11"], campaign.cell.config.modes.band_hz
+def hits_in(folder: Path) -> list[Path]:
+    return sorted((folder / "data").iterdir())
+
+
+def test_a_window_that_nobody_stated_is_asked_about(first_pose):
+    campaign, joints_deg = Campaign(first_pose.cell), tuple(first_pose.joints_deg)
 
     def faded(hit: Hit, rate_1_s: float) -> Hit:
         t = (np.arange(len(hit.force_n)) - hit.pulse.peak) / hit.sampling_rate_hz
         by = np.exp(-rate_1_s * np.maximum(t, 0.0))
         return replace(hit, force_n=hit.force_n * by, acceleration_m_s2=hit.acceleration_m_s2 * by)
 
+    read = [hit for path in first_pose.files for hit in Source(path, path.name).read()[0]]
     for rate_1_s, stated_1_s, asks in ((0.0, 0.0, False), (2.0, 0.0, True), (2.0, 2.0, False)):
-        read = (Source(row.file, row.file.name, row.hit).read()[0] for row in rows)
-        hits = tuple(faded(hit, rate_1_s) for own in read for hit in own)
-        cell = campaign.cell
+        cell, hits = campaign.cell, tuple(faded(hit, rate_1_s) for hit in read)
         modes = msgspec.structs.replace(cell.config.modes, window_rate_1_s=stated_1_s)
         cell = replace(cell, config=msgspec.structs.replace(cell.config, modes=modes))
-        claim = Claim(replace(campaign.model, cell=cell), campaign.state, "A11", rows[0].joints_deg)
-        asked = question_about(claim, MeasuredPose((), band_hz, "h1", stated_1_s, given=hits))
+        claim = Claim(replace(campaign.model, cell=cell), campaign.state, "X", joints_deg)
+        asked = question_about(claim, MeasuredPose((), BAND_HZ, "h1", stated_1_s, given=hits))
         assert (asked is not None and "[modes] window_rate_1_s" in asked.text) == asks
         if asked is not None:
-            assert float(asked.text.split("fades by ")[1].split()[0]) == pytest.approx(
-                2.0, rel=0.03
-            )
+            told = float(asked.text.split("fades by ")[1].split()[0])
+            assert told == pytest.approx(2.0, rel=0.03)
             assert asked.about == "chain"
 
 
-def test_a_readback_far_from_its_setpoint_is_asked_about_at_the_first_pose(tmp_path):
-    campaign, pool = shipped_campaign(tmp_path), shipped_pool()
-    rows, band_hz = pool["A11"], campaign.cell.config.modes.band_hz
-    stated = np.array(rows[0].joints_deg)
-    measured = measure(tuple(Source(r.file, r.file.name, r.hit) for r in rows), band_hz)
-    for off_deg, asks in ((3.0, False), (60.0, True)):
-        setpoint = tuple(stated + off_deg * (np.arange(len(stated)) == 4))
-        proposal = SimpleNamespace(pose="A11", joints_deg=setpoint)
-        state = cast("CampaignState", SimpleNamespace(measurements={}, proposals={"A11": proposal}))
-        asked = question_about(Claim(campaign.model, state, "A11", rows[0].joints_deg), measured)
-        assert (asked is not None and "60.00° from its setpoint" in asked.text) == asks
-        assert asked is None or asked.about == "readback"
+POSES, LOUD = 3, 1.2
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory) -> Case:
+    """Nothing is wrong but what is changed: quick (others: test_pose_mismatch_rates.py)."""
+    return one_thing("arm of four", "nothing", 7003, tmp_path_factory.mktemp("case"))
+
+
+def test_another_tool_and_a_wrong_unit_are_asked_about_and_nothing_else(case):
+    campaign = CaseCampaign.of(case)
+    state = campaign.state(POSES, unlisted=[POSES])
+    claim = Claim(campaign.model(state), state, "X", campaign.angles(case.q[POSES]))
+    right = case.measured[POSES].hits
+    in_millinewtons = tuple(replace(hit, force_n=1e3 * hit.force_n) for hit in right)
+    asked = [
+        question_about(claim, MeasuredPose((), case.band_hz, given=hits))
+        for hits in (right, case.heavier[POSES].hits, in_millinewtons)
+    ]
+    assert asked[0] is None
+    assert OTHER_TOOL in asked[1].text
+    assert "1000 times too small: units" in asked[2].text
+    assert not claim.model.low.misread
+    assert_chain_bends_nothing(claim.model)
+
+
+@pytest.mark.slow
+def test_an_early_pose_whose_files_are_of_another_is_asked_about(tmp_path):
+    """The hits of a pose that is never listed were given for the second one."""
+    case = everyday("arm of four", 7002, tmp_path)
+    changed = list(case.measured)
+    changed[1] = case.measured[-1]
+    campaign = CaseCampaign.of(replace(case, measured=tuple(changed)))
+    state = campaign.state(2, unlisted=[2])
+    claim = Claim(campaign.model(state), state, "X", campaign.angles(case.q[2]))
+    asked = question_about(claim, MeasuredPose((), case.band_hz, given=case.measured[2].hits))
+    assert asked is not None
+    assert (asked.about, asked.fits) == ("earlier", "P1")
+    assert "without them all others agree. Are its files and angles right" in asked.text
+
+
+def test_a_visit_with_another_gain_is_told_and_bends_nothing(case):
+    changed = list(case.measured)
+    louder = (replace(h, acceleration_m_s2=LOUD * h.acceleration_m_s2) for h in changed[1].hits)
+    changed[1] = MeasuredPose((), case.band_hz, given=tuple(louder))
+    model = CaseCampaign.of(replace(case, measured=tuple(changed))).after(POSES)
+    told = " ".join(model.low.misread)
+    size = re.search(r"at P1 accelerations are (\S+) times as large", told)
+    assert float(size[1]) == pytest.approx(LOUD, abs=0.05)
+    assert_chain_bends_nothing(model)
+
+
+def assert_chain_bends_nothing(model: Model) -> None:
+    posterior = model.low.identified_robot.posterior
+    scale, allowed = posterior.chain_scale
+    assert posterior.explains
+    assert posterior.structure.effects == ()
+    assert abs(scale) < 2 * allowed

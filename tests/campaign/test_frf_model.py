@@ -13,7 +13,6 @@ from planner.frf.metrics import agreement, direct_mean
 from planner.surrogate.leave_one_out import left_out_modes
 from planner.surrogate.modal_surrogate import fit_surrogate
 from tests.support.case_campaigns import CaseCampaign, FrfScore, lacking
-from tests.support.shipped_campaign import RECORDINGS, shipped_campaign
 from tests.support.surrogates import observed
 
 
@@ -73,10 +72,9 @@ def test_before_any_measurement_the_simulation_as_stated_says_what_to_expect(bas
     assert np.all(sd > 0)
 
 
-def test_what_was_worked_out_for_frfs_is_kept(tmp_path, monkeypatch):
+def test_what_was_worked_out_for_frfs_is_kept(two_poses, tmp_path, monkeypatch):
     store = Store(tmp_path / "models")
-    campaign = shipped_campaign(tmp_path, store=store)
-    campaign.import_paths((RECORDINGS,), "A11")
+    campaign = Campaign(two_poses[0].directory, store)
     q = campaign.cell.candidates.q[:1]
     assert not campaign.model.knows_frfs
     first = campaign.frf_at(q)

@@ -31,11 +31,11 @@ POSES = "A11", "A33"
 def two(tmp_path_factory):
     """A campaign of two poses, whose simulation stays as it is: no model takes long."""
     parent = tmp_path_factory.mktemp("two")
-    return measured(parent, POSES, Store(None), FROZEN).directory
+    return measured(parent, POSES).directory
 
 
-def measured(parent, poses, store, more=""):
-    campaign = shipped_campaign(parent, more, store)
+def measured(parent, poses):
+    campaign = shipped_campaign(parent, FROZEN, Store(None))
     for pose in poses:
         campaign.import_paths((RECORDINGS,), pose)
     return campaign
@@ -81,19 +81,18 @@ def alike(a, b):
     return all(np.allclose(u, v, rtol=1e-6, atol=1e-6 * np.abs(u).max()) for u, v in pairs)
 
 
-def test_a_kept_model_is_the_fitted_one(tmp_path, store, fitted):
+def test_a_kept_model_is_the_fitted_one(two_poses, store, fitted):
     """Of a simulation that learns, too."""
-    campaign = measured(tmp_path, POSES[:1], store)
-    fitted.clear()
-    first, again = campaign.model, Campaign(campaign.directory, store).model
-    assert len(fitted) == 0
-    assert again is not first
-    anew = Campaign(campaign.directory, Store(None)).model
+    folder = two_poses[0].directory
+    first, again = (Campaign(folder, store).model for _ in range(2))
     assert len(fitted) == 1
+    assert again is not first
+    anew = Campaign(folder, Store(None)).model
+    assert len(fitted) == 2
     assert same(first, again)
     assert alike(anew, again)
     assert again.remarks == anew.remarks
-    assert [p.pose for p in again.labelled] == list(POSES[:1])
+    assert [p.pose for p in again.labelled] == ["P001", "P002"]
 
 
 def test_another_configuration_program_or_folder_has_another_model(
@@ -165,7 +164,7 @@ def test_status_of_a_kept_model_needs_no_heavy_library(folder):
 def one(tmp_path_factory):
     """A campaign of one pose."""
     parent = tmp_path_factory.mktemp("one")
-    return measured(parent, POSES[:1], Store(None), FROZEN).directory
+    return measured(parent, POSES[:1]).directory
 
 
 @pytest.fixture

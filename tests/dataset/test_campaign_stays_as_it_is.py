@@ -6,13 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.campaign.campaign import Campaign
 from planner.campaign.recordings_source import recordings_source
-from planner.demo import NAME, shipped
 from planner.errors import InputError
 from planner.progress import no_progress
 from tests.support.outside import FROZEN, refused, told
-from tests.support.shipped_campaign import RECORDINGS, shipped_pool
+from tests.support.shipped_campaign import RECORDINGS, shipped_campaign
 
 
 def content(folder: Path) -> dict[str, tuple[str, int]]:
@@ -29,16 +27,10 @@ def content(folder: Path) -> dict[str, tuple[str, int]]:
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
-    source = shipped(NAME)
-    root = tmp_path_factory.mktemp("root")
-    toml = source / "robot" / "robot.toml"
-    plan = root / "campaign.toml"
-    plan.write_text((source / "campaign.toml").read_text() + FROZEN)
-    made = Campaign.new(root / "campaign", toml, plan)
-    band_hz = made.cell.config.modes.band_hz
+    made = shipped_campaign(tmp_path_factory.mktemp("root"), FROZEN)
     with pytest.raises(InputError, match="import"):
-        made.dataset(band_hz)
-    for pose in [*shipped_pool()][:2]:
+        made.dataset(made.cell.config.modes.band_hz)
+    for pose in ("A11", "A12"):
         made.import_paths((RECORDINGS,), pose)
     return made
 

@@ -1,8 +1,5 @@
 """What was otherwise at one pose: what it does to FRFs, and that it is found where it is."""
 
-import tomllib
-from xml.etree import ElementTree
-
 import numpy as np
 import pytest
 
@@ -18,7 +15,7 @@ from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
 from planner.measurement.nuisances import Tolerances
 from planner.robot.robot import Robot
-from tests.support.faulty_robots import mass_that_moves
+from tests.support.faulty_robots import mass_that_moves, urdf_of
 from tests.support.fitted_cases import COUNTED, HEAVIER, Case, everyday
 
 POSE, JOINT, OFF_DEG = 0, 2, 5.0
@@ -119,8 +116,7 @@ def test_a_heavier_tool_at_one_pose_is_found_with_its_mass(case, prior):
     assert isinstance(effect, OtherTool)
     assert effect.pose == NAMES[pose]
     mass, sd, _ = effect.parameters(told.values(effect))["mass"]
-    urdf = case.toml.parent / tomllib.loads(case.toml.read_text())["urdf"]
-    more = HEAVIER * mass_that_moves(ElementTree.parse(urdf).getroot())
+    more = HEAVIER * mass_that_moves(urdf_of(case.toml)[1])
     assert mass == pytest.approx(more, abs=3 * sd)
     assert sd < 0.2 * mass
     (text,) = told.misread

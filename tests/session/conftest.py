@@ -1,7 +1,6 @@
 """A session with a fake analyser that writes slowly and a scripted engineer."""
 
 import io
-import shutil
 import time
 from dataclasses import dataclass
 
@@ -10,7 +9,6 @@ from rich.console import Console
 
 from planner.campaign.campaign import Campaign
 from planner.session.watch import SessionSummary, watch
-from tests.support.outside import make_cell, record
 
 
 class Script:
@@ -64,26 +62,11 @@ def cell(first_pose, tmp_path):
     return Campaign(first_pose.cell), first_pose.truth, tmp_path / "inbox"
 
 
-@pytest.fixture(scope="session")
-def measured_once(tmp_path_factory):
-    """A campaign of three poses, and the robot's truth: to be copied."""
-    root = tmp_path_factory.mktemp("measured")
-    robot, campaign_toml, truth = make_cell(root)
-    campaign = Campaign.new(root / "cell", robot, campaign_toml)
-    for number in range(3):
-        pose = campaign.next()[0]
-        folder = record(truth, root / f"made{number}", pose.pose, pose.joints_deg, number)
-        (report,) = campaign.import_paths((folder,))
-        assert report.question is None
-    return campaign.directory, truth
-
-
 @pytest.fixture
-def measured(measured_once, tmp_path):
-    """A campaign of three poses, the robot's truth, and a folder to watch."""
-    folder, truth = measured_once
+def measured(two_poses, tmp_path):
+    """A campaign of two poses, the robot's truth, and a folder to watch."""
     (tmp_path / "inbox").mkdir()
-    return Campaign(shutil.copytree(folder, tmp_path / "cell")), truth, tmp_path / "inbox"
+    return *two_poses, tmp_path / "inbox"
 
 
 @pytest.fixture

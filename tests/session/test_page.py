@@ -162,35 +162,32 @@ def test_names_of_files_leave_room_for_what_is_said_of_them(page):
     assert "A second pulse follows." in refusals(SimpleNamespace(refused=[refused]))
 
 
-def test_a_sentence_under_a_full_page_is_seen(page):
+def under_a_full_page(page, *said):
+    """What the screen shows after the last of the texts that were said."""
     console = Console(width=80, height=24, force_terminal=True, legacy_windows=False)
     screen = Screen(console)
-    told = "Hits are missing (x 1/4, y 0/4, z 0/4): hit on, or press a again to accept it as it is."
     with console.capture():
         screen.show(replace(page, hits=ALL).page)
-        screen.say(Text("An earlier sentence."))
-    with console.capture() as captured:
-        screen.say(Text(told))
-    text = Text.from_ansi(captured.get().split("\x1b[2J")[-1]).plain
-    assert told in whole(text.split("\n"))
-    assert " ".join(remedy_first(OTHER.text)) in whole(text.split("\n"))
-    assert text.rstrip("\n").count("\n") < 24
+    for text in said:
+        with console.capture() as captured:
+            screen.say(Text(text))
+    shown = Text.from_ansi(captured.get().split("\x1b[2J")[-1]).plain
+    assert shown.rstrip("\n").count("\n") < 24
+    return shown
+
+
+def test_a_sentence_under_a_full_page_is_seen(page):
+    told = "Hits are missing (x 1/4, y 0/4, z 0/4): hit on, or press a again to accept it as it is."
+    shown = whole(under_a_full_page(page, "An earlier sentence.", told).split("\n"))
+    assert told in shown
+    assert " ".join(remedy_first(OTHER.text)) in shown
 
 
 def test_help_is_seen_where_the_page_is_full(page):
-    console = Console(width=80, height=24, force_terminal=True, legacy_windows=False)
-    screen = Screen(console)
-    with console.capture():
-        screen.show(replace(page, hits=ALL).page)
-    with console.capture() as captured:
-        screen.say(Text(HELP))
-    text = Text.from_ansi(captured.get().split("\x1b[2J")[-1]).plain
-    assert all(line in text for line in HELP.split("\n"))
-    assert "any key" in text
-    assert text.rstrip("\n").count("\n") < 24
-    with console.capture() as captured:
-        screen.say(Text("One more."))
-    assert "go to pose" in captured.get()
+    shown = under_a_full_page(page, HELP)
+    assert all(line in shown for line in HELP.split("\n"))
+    assert "any key" in shown
+    assert "go to pose" in under_a_full_page(page, HELP, "One more.")
 
 
 def test_hits_without_an_axis_are_told_once_and_leave_the_page_its_head(page):

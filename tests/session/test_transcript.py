@@ -127,7 +127,7 @@ def test_a_session_in_which_all_goes_wrong(measured):
     first, second = campaign.next(2)
     terminal = Terminal(campaign.directory, inbox, "--hits-per-pose", 6)
     try:
-        page = terminal.until(f"go to pose {first.pose}", "axes of tool", "x 0/2", "/inbox")
+        page = terminal.until(f"go to pose {first.pose}", "axes of tcp", "x 0/2", "/inbox")
         assert "accept" not in page  # there is nothing to accept
         analyser = Analyser(truth, inbox, first.joints_deg)
         for name, axis, said in (

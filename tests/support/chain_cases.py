@@ -1,7 +1,7 @@
 """What a measuring chain may do wrong to the hits of a true robot."""
 
-import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pyuff
@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from planner.campaign.chain_faults import ChainFault
 from planner.campaign.chain_mismatch import LOG_ODDS, HitSums, hit_sums, most_probable
+from planner.export.uff import write_sets
 from tests.support.case_campaigns import CaseCampaign
 
 FACTORS = {
@@ -62,14 +63,12 @@ def judged(sums: HitSums) -> ChainFault | None:
     return found if gain >= LOG_ODDS else None
 
 
-def scaled(row, folder, factor: float):
-    """The file of a row with accelerations too large by a factor."""
-    path = folder / row.file.name
-    sets = pyuff.UFF(str(row.file)).read_sets()
+def scaled(file: Path, folder: Path, factor: float) -> Path:
+    """A copy of a hit's file with accelerations too large by a factor."""
+    folder.mkdir(parents=True, exist_ok=True)
+    sets = pyuff.UFF(str(file)).read_sets()
     for one in sets:
         if one["ordinate_spec_data_type"] == 12:
             one["data"] = factor * np.array(one["data"])
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ResourceWarning)
-        pyuff.UFF(str(path)).write_sets(sets, "add")
-    return path
+    write_sets(folder / file.name, sets)
+    return folder / file.name

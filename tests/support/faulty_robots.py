@@ -10,6 +10,7 @@ from shutil import copytree
 import numpy as np
 
 from planner.demo import shipped
+from planner.proof import descriptions
 from planner.proof.arms import in_a_cell
 from planner.proof.cases import SCATTER
 from planner.proof.deviation import AttachedResonator, BentLink, soft_floor
@@ -18,8 +19,8 @@ from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
 from planner.proof.scene import PULSE_S, deviate, log_uniform, some_direction, triple
 from planner.proof.springs import beam_end
-from tests.support import generated_arms
 from tests.support.arm_with_points import NODES, write_arm
+from tests.support.outside import HAMMER
 
 KINDS = "nothing", "soft base", "bending link", "hose"
 SIZES = 0.01, 1.0  # of what is lacking, 1 being large: log-uniform, drawn once
@@ -65,12 +66,38 @@ def _pointed(folder: Path, _: np.random.Generator) -> Robot:
     return Robot(toml, f"joints_deg = {box}", (4.0, 90.0), hammer, {**NODES, "tcp": TCP_NODE})
 
 
+DRAWN_HZ = (3.0, 60.0)
+DRAWN_AXES = ((0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0))
+DRAWN_DEG = [[-60, 60], [-80, -10], [10, 90], [-90, 90], [-60, 60]]
+
+
 def _drawn(folder: Path, rng: np.random.Generator) -> Robot:
-    """An arm of five joints that was drawn for this campaign alone."""
-    arm = generated_arms.make_generated_arm(folder, int(rng.integers(2**31)), 5, MOST_MODES)
-    box = [list(r) for r in generated_arms.BOX_DEG[:5]]
-    band, hammer = generated_arms.BAND_HZ, generated_arms.HAMMER
-    return Robot(arm.robot_toml, f"joints_deg = {box}", band, hammer)
+    """An arm of five joints that was drawn for this campaign alone, without meshes."""
+    rng = np.random.default_rng(int(rng.integers(2**31)))
+    urdf = _drawn_urdf(rng)
+    lines = descriptions.head("generated", "arm.urdf", "tcp", "tcp", DRAWN_HZ)
+    for number, axis in enumerate(DRAWN_AXES, 1):
+        stiffness = log_uniform(rng, 2e4, 8e4) / (5 if number > 3 else 1)
+        lines.append(descriptions.compliance(f"joint_{number}", axis, stiffness, 4e-4))
+    toml = descriptions.write_robot(folder / "robot", "arm.urdf", urdf, lines)
+    return Robot(toml, f"joints_deg = {DRAWN_DEG}", DRAWN_HZ, HAMMER)
+
+
+def _drawn_urdf(rng: np.random.Generator) -> str:
+    masses = np.sort(rng.uniform(1.5, 12.0, len(DRAWN_AXES)))[::-1]
+    parts = [descriptions.link("link_0")]
+    for i, (mass, axis) in enumerate(zip(masses, DRAWN_AXES, strict=True), 1):
+        x, z = (0.0, 0.25) if i == 1 else (rng.uniform(0, 0.12), rng.uniform(0.05, 0.2))
+        if i > 2:
+            x, z = rng.uniform(0.25, 0.5), rng.uniform(-0.03, 0.03)
+        centre = np.round([rng.uniform(0.08, 0.2), *rng.uniform(-0.03, 0.03, 2)], 3)
+        moments = np.round(mass * np.array([0.008, 0.02, 0.02]), 5)
+        names, place = (f"joint_{i}", f"link_{i - 1}", f"link_{i}"), np.round((x, 0, z), 3)
+        inertial = descriptions.inertial(np.round(mass, 3), centre, moments)
+        parts.append(descriptions.link(f"link_{i}", inertial))
+        parts.append(descriptions.joint(*names, place, axis, (-2.9, 2.9)))
+    parts.append(descriptions.frame("tcp", f"link_{len(masses)}", (0.18, 0.03, 0.05)))
+    return descriptions.urdf("generated", parts)
 
 
 ROBOTS: dict[str, Callable[[Path, np.random.Generator], Robot]] = {

@@ -2,7 +2,12 @@
 
 from pathlib import Path
 
+from planner.campaign.campaign import Campaign
 from planner.proof import descriptions
+from planner.proof.deviation import Deviation
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
+from tests.support.outside import record
 
 PLACES = [(0, 0, 0.3), (0, 0, 0.1), (0.4, 0, 0), (0.35, 0, 0)]
 AXES = [(0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0)]
@@ -41,3 +46,16 @@ def plain_campaign(path: Path, acquisition: str = "integrated_variance") -> Path
     goal = "[goal]\njoints_deg = [[0, -40, 50, 0], [20, -40, 50, 10]]\n"
     path.write_text(descriptions.campaign(JOINTS_DEG, 2, BAND_HZ, more + goal))
     return path
+
+
+def measured_poses(root: Path, count: int) -> tuple[Campaign, Truth]:
+    """A campaign after so many proposals, whose simulation learns, and the true arm."""
+    robot, plan = make_plain_arm(root / "robot"), plain_campaign(root / "plan" / "campaign.toml")
+    truth = load_truth(robot, Deviation(3, 0.12, 0.1, 0.04, 0.003))
+    campaign = Campaign.new(root / "cell", robot, plan)
+    for number in range(count):
+        (pose,) = campaign.next()
+        made = record(truth, root / f"made{number}", pose.pose, list(pose.joints_deg), number)
+        (report,) = campaign.import_paths((made,))
+        assert report.question is None
+    return campaign, truth
