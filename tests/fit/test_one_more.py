@@ -29,7 +29,7 @@ KINDS = (
 
 @pytest.fixture(scope="module")
 def search(tmp_path_factory) -> Search:
-    case = everyday("irb6640", 1, tmp_path_factory.mktemp("case"))
+    case = everyday("arm of four", 9, tmp_path_factory.mktemp("case"))
     simulation = Simulation(Robot.load(case.toml))
     prior = RobotPrior(EffectLibrary.of(simulation, CAD_INERTIAS, diagnosed(simulation)))
     q = case.q[:3]
