@@ -10,7 +10,6 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.events import Question
-from planner.campaign.labels import found_modes
 from planner.errors import RefusedFile
 from planner.report.answer import Done, plain
 from planner.report.modes import mode_keys
@@ -99,6 +98,8 @@ class PoseImport:
         report, modes = self.report, []
         if report.measurement is None:
             return modes
+        from planner.campaign.labels import found_modes  # and Pinocchio, where a model was fitted
+
         found = found_modes(report.pose, report.model, report.model_before)
         known = {one.mode.frequency_hz: one for one in found if one.mode}
         for mode in report.measurement.modes:
