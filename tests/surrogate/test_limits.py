@@ -138,9 +138,11 @@ def test_frequencies_told_by_the_simulations_shapes_stand_beside_their_own_predi
         labelled=tuple(SimpleNamespace(pose=f"P{i}", modes=(None,)) for i in range(9)),
         seen=SimpleNamespace(frequency_hz=np.exp(training.y)),
     )
-    rows, error = left_out(model).frequencies, leave_one_out(outputs, 9).error
-    np.testing.assert_allclose([r.measured_hz for r in rows], np.exp(training.y[:, 0]))
-    np.testing.assert_allclose([r.predicted_hz for r in rows], np.exp((training.y - error)[:, 0]))
+    rows, error = left_out(model)["frequencies"], leave_one_out(outputs, 9).error
+    np.testing.assert_allclose([r["measured_hz"] for r in rows], np.exp(training.y[:, 0]))
+    np.testing.assert_allclose(
+        [r["predicted_hz"] for r in rows], np.exp((training.y - error)[:, 0])
+    )
 
 
 SQUARE = np.random.default_rng(5).random((200, 2))
