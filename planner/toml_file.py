@@ -61,7 +61,7 @@ def load_toml(path: Path, kind: type[T], name: str) -> T:
     for steps, value in _numbers(given):
         if not math.isfinite(value):
             raise InputError(
-                f"{path}: {_entry(steps, given=given)} is {value}; it must be a finite number."
+                f"{path}: {_entry(steps, given)} is {value}; it must be a finite number."
             )
     return found
 
@@ -80,7 +80,7 @@ def wrong_entry(path: Path | str, name: str, given: Any, kind: type, fault: str)
     steps = [step for step in re.findall(r"\.\.\.|\w+", at) if step]
     unknown = re.search(r"unknown field `([^`]+)`", what)
     if unknown:
-        table = _entry(steps, table=True)
+        table = _entry(steps, given, table=True)
         known = list(_hints(kind, steps))
         near = difflib.get_close_matches(unknown[1], known, 1)
         meant = f"; entries of {'this table' if table else f'a {name}'} are {', '.join(known)}."
@@ -88,34 +88,36 @@ def wrong_entry(path: Path | str, name: str, given: Any, kind: type, fault: str)
         return f'{path}: {table + " has" if table else "there is"} no entry "{unknown[1]}"{meant}'
     missing = re.search(r"missing required field `([^`]+)`", what)
     if missing:
-        return f"{path}: {_entry([*steps, missing[1]])} is missing; add it."
+        return f"{path}: {_entry([*steps, missing[1]], given)} is missing; add it."
     if what.startswith("Invalid enum value") and (choices := _choices(kind, steps)):
         said = f"{', '.join(choices[:-1])} or {choices[-1]}"
-        return f"{path}: {_entry(steps)} must be {said}, not {_given(given, steps)}."
+        return f"{path}: {_entry(steps, given)} must be {said}, not {_given(given, steps)}."
     if re.match("Expected `(int|float)` [<>]", what):
-        where, value = _entry(steps, given=given), _given(given, steps)
+        where, value = _entry(steps, given), _given(given, steps)
         endless = value.lstrip("-") in ("nan", "inf")
         must = "a finite number" if endless else _limits(kind, steps)
         return f"{path}: {where} is {value}; it must be {must}."
     wanted = re.fullmatch(r"Expected `([^`]+)`, got `[^`]+`", what)
     if not wanted or not steps:
-        where = f"{_entry(steps)}: " if steps else ""
+        where = f"{_entry(steps, given)}: " if steps else ""
         return f"{path}: {where}{what[:1].lower()}{what[1:]}; correct it."
     kinds = [_WANTED.get(k.strip(), k.strip()) for k in wanted[1].split("|") if k.strip() != "null"]
-    return f"{path}: {_entry(steps)} must be {' or '.join(kinds)}, not {_given(given, steps)}."
+    return (
+        f"{path}: {_entry(steps, given)} must be {' or '.join(kinds)}, not {_given(given, steps)}."
+    )
 
 
-def _entry(steps: Sequence[str], table: bool = False, given: Any = None) -> str:
+def _entry(steps: Sequence[str], given: Any, table: bool = False) -> str:
     """Where an entry, or a `table`, stands, as one would look for it: "[modes] count".
 
-    Tables of a list with number and name, where what is `given` in the file is known.
+    Tables of a list with number and name, as they are `given` in the file.
     """
     names = [i for i, step in enumerate(steps) if not _is_place(step)]
     said = []
     for k, i in enumerate(names):
         place = steps[i + 1] if i + 1 < len(steps) and _is_place(steps[i + 1]) else ""
         if k + 1 < len(names) or table:
-            number = f" number {int(place) + 1}" if given and place.isdecimal() else ""
+            number = f" number {int(place) + 1}" if place.isdecimal() else ""
             block = _at(given, steps[: i + 2]) if number else {}
             number += next((f" ({block[key]})" for key in NAMES if key in block), "")
             said.append(f"[[{steps[i]}]]{number}" if place else f"[{steps[i]}]")
