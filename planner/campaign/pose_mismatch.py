@@ -245,6 +245,8 @@ class PosesTogether:
         if len(others) >= SURE and not hits.agree():
             typed += alternatives.joint_offsets(self.joints, expected, self.frfs[i], stated)
         agree = len(others) >= SURE and explains_all(fit)
+        # Where the others know what it should show, it is elsewhere only if it does not show that.
+        agree = agree and (hits.doubted or not hits.placed)
         alone = fit.evidence + hits.outlier_log_density, agree
         return alone, hits.best_alternative(typed)
 
