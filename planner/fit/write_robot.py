@@ -109,9 +109,12 @@ def _state_halves(document: tomlkit.TOMLDocument, halves: Mapping[str, OuterHalf
 
 def drop_stated_inertias(document: tomlkit.TOMLDocument) -> None:
     """Leave of [[link]] only how sure it is: the URDF has its numbers now."""
-    for block in document.get("link", ()):
+    blocks = document.get("link", [])
+    for number in reversed(range(len(blocks))):
         for entry in INERTIAL_ENTRIES:
-            block.pop(entry, None)
+            blocks[number].pop(entry, None)
+        if blocks[number].keys() <= {"link", "guessed"}:  # which states nothing
+            del blocks[number]
 
 
 @dataclass(frozen=True)

@@ -339,6 +339,19 @@ def test_halves_are_written_and_read(tmp_path):
     assert np.linalg.norm(read - found) < 0.02 * np.linalg.norm(uniform - found)
 
 
+def test_a_robot_whose_links_were_stated_without_an_sd_is_written_and_read(tmp_path):
+    robot = bent(tmp_path)
+    body = "mass_kg = 150.0\ncentre_m = [0.1, 0, 0]\ninertia_kg_m2 = [5, 0, 0, 9, 0, 9]\n"
+    with robot.path.open("a") as file:
+        file.write(f'\n[[link]]\nlink = "link_3"\n{body}')
+    robot = Robot.load(robot.path)
+    simulation = Simulation(robot)
+    changed = simulation.changed(simulation.elasticity, 0.02 * simulation.elastic.inertia)
+    written = write_robot(tmp_path / "out" / "robot.toml", robot, _identified(changed))
+    again = Simulation(Robot.load(written.robot_toml)).elastic
+    np.testing.assert_allclose(again.inertia, changed.elastic.inertia, rtol=1e-6, atol=1e-6)
+
+
 def test_an_outer_half_that_leaves_nothing_is_refused(tmp_path):
     robot = bent(tmp_path)
     half = "{mass_kg = 1e4, centre_m = [0, 0, 0], inertia_kg_m2 = [1, 0, 0, 1, 0, 1]}"
